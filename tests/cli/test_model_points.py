@@ -10,7 +10,7 @@ import pytest
 
 from fba.face.importers.head_surface import HeadSurface
 from fba_player.scene._point_placement import PointPlacement
-from fba_player.window import place_points
+from fba_player.window import pages
 from mesh_files import write_obj
 from small_head import small_head
 
@@ -34,8 +34,8 @@ def user(monkeypatch: pytest.MonkeyPatch) -> list[Callable[[PointPlacement], Non
             do(placement)
         return placement
 
-    monkeypatch.setattr(place_points, "check_window", lambda: None)
-    monkeypatch.setattr(place_points, "place_points", show)
+    monkeypatch.setattr(pages, "check_page", lambda subject: None)
+    monkeypatch.setattr(pages, "place_points", show)
     return doings
 
 

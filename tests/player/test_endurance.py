@@ -193,7 +193,7 @@ class TestSizes:
 
 @pytest.mark.usefixtures("opengl")
 class TestSeveral:
-    def test_two_that_draw_in_turns_draw_what_one_draws(self) -> None:
+    def test_two_renderers_in_turns_draw_what_one_draws(self) -> None:
         scene = small_scene()
         with Offscreen(scene, (48, 36)) as alone:
             expected = [alone.frame(t / 10) for t in range(5)]

@@ -23,7 +23,7 @@ def body(tmp_path_factory: pytest.TempPathFactory) -> BodyModel:
     return import_body(write_person(tmp_path_factory.mktemp("people") / "person.glb"))
 
 
-def test_the_own_head_is_shown_and_turned(body: BodyModel) -> None:
+def test_the_head_of_the_body_is_shown_and_turned(body: BodyModel) -> None:
     yaw = fap_numbers()["head_yaw"]
     animation = Animation(25, np.arange(2), face_track([{}, {yaw: QUARTER}]), body_track([{}, {}]))
     scene = Scene(animation, body=body)
@@ -41,7 +41,7 @@ def test_the_own_head_is_shown_and_turned(body: BodyModel) -> None:
     np.testing.assert_allclose(after[box] - skull, quarter, atol=2e-4)
 
 
-def test_the_camera_looks_at_the_own_head(body: BodyModel) -> None:
+def test_the_camera_looks_at_the_head_of_the_body(body: BodyModel) -> None:
     animation = Animation(25, np.arange(1), face_track([{}]), body_track([{}]))
     scene = Scene(animation, body=body)
     box = np.asarray(scene.view_at(0.0).faces[0].positions)[head_rows(body)]

@@ -147,9 +147,9 @@ def command(request: _Request) -> None:
     _check_options(output, request.drawing)
     outputs = _outputs(request)
     if output is None:
-        from fba_player.window.map_markers import check_window
+        from fba_player.window.pages import check_page
 
-        check_window()
+        check_page("markers")
     motion = _read_capture(capture, request.reading)
     with Progress("reading", None):
         from fba.capture.virtual_markers import read_head
@@ -164,7 +164,7 @@ def command(request: _Request) -> None:
             f"--marker {marker}: the capture has no such marker; it has {list_names(motion.names)}"
         )
     if output is None:
-        from fba_player.window.map_markers import map_markers
+        from fba_player.window.pages import map_markers
 
         saved, _ = split_maps(request.maps, "mapping")
         path = request.map_out or saved or Path(f"{capture.stem}.virtual.toml")

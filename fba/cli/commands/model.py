@@ -267,10 +267,10 @@ def points_(
     the current one, M mirrors it to the other side, Ctrl+S saves; the window lists all keys. Each point is
     put on the nearest vertex of the mesh. If nothing is saved, the exit code is 1.
     """
-    from fba_player.window.place_points import check_window, place_points
+    from fba_player.window.pages import check_page, place_points
 
     outputs = _points_outputs(output, head, no_clobber=no_clobber)
-    check_window()
+    check_page("points")
     from fba.face.importers.head_surface import read_head_surface
 
     with Progress("reading", None):

@@ -14,9 +14,9 @@ from fba.easing import smoothstep
 from fba.errors import FbaWarning
 from fba.face import FaceModel, Part
 from fba.face.model import point_row
+from fba.rotations import unit
 from fba_player._mesh.simplify import DetailLevels
 from fba_player._mesh.textures import RELIEF, FacePicture, load_picture, texture_breadth
-from fba_player.view._geometry import unit_rows
 from fba_player.view._view import FaceShape
 
 if TYPE_CHECKING:
@@ -48,10 +48,9 @@ COLOUR_WEIGHT = 0.004
 
 
 def compute_sway(model: FaceModel) -> Float32:
-    """Return float32 (V,): how far each vertex turns with the head, from 1 above jaw and ears to 0 down the
-    neck."""
-    chin = known_middle(model, ("2.1", "2.10"))
-    lobe = known_middle(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
+    """Return float32 (V,): share of the head's turn, from 1 above jaw and ears to 0 down the neck."""
+    chin = middle_of_points(model, ("2.1", "2.10"))
+    lobe = middle_of_points(model, ("10.7", "10.8", "10.5", "10.6", "7.1"))
     if chin is None or lobe is None:
         return np.ones(len(model.vertices), dtype=np.float32)
     reach = NECK_LENGTH * model.fapu.ENS * 1024
@@ -62,23 +61,19 @@ def compute_sway(model: FaceModel) -> Float32:
     return smoothstep(1 - (border - y) / reach).astype(np.float32)
 
 
-def known_middle(model: FaceModel, names: Sequence[str]) -> Float64 | None:
+def middle_of_points(model: FaceModel, names: Sequence[str]) -> Float64 | None:
     """Return (3,): the middle of the first two of the named feature points that the face has, or None."""
     points = np.array([model.points[point_row(name)] for name in names])
-    known = points[np.isfinite(points).all(axis=1)][:2]
-    return np.asarray(known.mean(axis=0)) if len(known) else None
+    first = points[np.isfinite(points).all(axis=1)][:2]
+    return np.asarray(first.mean(axis=0)) if len(first) else None
 
 
 def make_shape(part: Part, sways: Float32) -> FaceShape:
     """Return the constant data of a part. sways: (V,), how far its vertices turn with the head."""
-    colours = part.colours
-    if colours is None:
-        row = (*part.material.colour, 1.0 - part.material.roughness)
-        colours = np.tile(np.array(row, dtype=np.float32), (len(part.vertices), 1))
-    picture = _picture(part) if part.texcoords is not None else None
+    picture = part_picture(part)
     return FaceShape(
         part.triangles,
-        colours,
+        part_colours(part, part.material.colour),
         sways if part.kind in ("skin", "hair", "other") else np.ones_like(sways),
         part.texcoords,
         picture,
@@ -114,8 +109,7 @@ def detail_levels(
 
 
 def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
-    """Return the slice of a part's vertices in the arrays of its model. Raises KeyError for an unknown
-    name."""
+    """Return the slice of a part's vertices in the arrays of its model; KeyError for an unknown name."""
     start = model.starts[name]
     return slice(start, start + len(model.part(name).vertices))
 
@@ -156,9 +150,9 @@ def find_hairs(part: Part) -> Float32 | None:
     complete = paired & (tip[hair] >= 0)
     across = np.zeros((count, 8), dtype=np.float32)
     across[:, 7] = np.where(np.arange(count) < opposite, 1, -1)
-    across[complete, :3] = unit_rows(vertices[complete] - vertices[opposite[complete]])
+    across[complete, :3] = unit(vertices[complete] - vertices[opposite[complete]])
     across[complete, 3] = half[complete]
-    across[complete, 4:7] = unit_rows(vertices[tip[hair[complete]]] - vertices[complete])
+    across[complete, 4:7] = unit(vertices[tip[hair[complete]]] - vertices[complete])
     return across
 
 
@@ -193,9 +187,17 @@ def _is_smooth(part: Part) -> bool:
     return bool(((cosines < BENT_COSINE) & (lengths > LONG_EDGE)).mean() < MAX_BENT_SHARE)
 
 
-def _picture(part: Part) -> FacePicture | None:
-    """Return the part's texture, or None, with an FbaWarning if it cannot be read."""
-    if part.material.texture is None:
+def part_colours(part: Part, plain: tuple[float, ...]) -> Float32:
+    """Return float32 (V, 4): the colours of a part and its gloss; `plain` where it has none."""
+    if part.colours is not None:
+        return part.colours
+    row = np.array((*plain, 1.0 - part.material.roughness), dtype=np.float32)
+    return np.tile(row, (len(part.vertices), 1))
+
+
+def part_picture(part: Part) -> FacePicture | None:
+    """Return a part's texture, None without one, or, with an FbaWarning, if it cannot be read."""
+    if part.material.texture is None or part.texcoords is None:
         return None
     try:
         return load_picture(part.material.texture)

@@ -34,8 +34,10 @@ CAPSULES = (
     ("l_knee", "l_ankle", 0.05), ("r_knee", "r_ankle", 0.05),
 )  # fmt: skip
 """Joints at both ends, and the radius (m) for a body 1.75 m tall."""
-KEY = tuple(np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION))
+KEY_UNIT = tuple(np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION))
+"""Unit vector towards the key light."""
 ADULT_HEIGHT = 1.75
+"""Metres."""
 SAMPLING_ERROR = 0.0064
 """Light is computed at the vertices that are left when the surface is simplified with this error (m)."""
 NEIGHBOURS = 3
@@ -98,27 +100,21 @@ class BodyLight:
             left = None if coarser is None else coarser.triangles_within(SAMPLING_ERROR)
             rows.append(np.arange(len(part.vertices)) if left is None or not len(left) else np.unique(left))
         near, shares = _nearest_samples([part.vertices for part in body.parts], rows)
-        starts = [body.starts[part.name] for part in body.parts]
         every = np.ones(len(body.vertices), dtype=bool)
         open_ = cached_visibility(body.vertices, body.normals, body.triangles, every).open
-        return (
-            np.concatenate([samples + start for samples, start in zip(rows, starts, strict=True)]).astype(
-                np.int32
-            ),
-            near,
-            shares,
-            (1 - FOLD_STRENGTH * (1 - np.clip(open_, 0, 1))).astype(np.float32),
-        )
+        counted = [samples + body.starts[part.name] for samples, part in zip(rows, body.parts, strict=True)]
+        left_by_folds = (1 - FOLD_STRENGTH * (1 - np.clip(open_, 0, 1))).astype(np.float32)
+        return np.concatenate(counted).astype(np.int32), near, shares, left_by_folds
 
 
 def build_body_light(body: BodyModel, coarser: Mapping[str, DetailLevels | None]) -> BodyLight:
     """Return the light on a body; coarser as in `BodyLight`."""
     names = body.skeleton.names
-    known = [row for row in CAPSULES if row[0] in names and row[1] in names]
-    ends = np.array([[names.index(a), names.index(b)] for a, b, _ in known], dtype=np.intp)
+    limbs = [row for row in CAPSULES if row[0] in names and row[1] in names]
+    ends = np.array([[names.index(a), names.index(b)] for a, b, _ in limbs], dtype=np.intp)
     tall = float(np.ptp(body.vertices[:, 1])) if len(body.vertices) else ADULT_HEIGHT
     share = 0.92 if "head" in {part.kind for part in body.parts} else 0.85  # up to the crown, or to the neck
-    radii = np.array([row[2] for row in known]) * (tall / share / ADULT_HEIGHT if tall > 0 else 1.0)
+    radii = np.array([row[2] for row in limbs]) * (tall / share / ADULT_HEIGHT if tall > 0 else 1.0)
     return BodyLight(body, coarser, ends, radii)
 
 
@@ -164,7 +160,7 @@ def _capsules(ends: Float64, radii: Float64) -> Float32:
     capsules = np.empty((len(ends), 11), dtype=np.float32)
     axis = ends[:, 1] - ends[:, 0]
     squared = np.maximum(np.einsum("ij,ij->i", axis, axis), 1e-9)
-    along = axis @ KEY
+    along = axis @ KEY_UNIT
     capsules[:, :3], capsules[:, 3:6], capsules[:, 7] = ends[:, 0], axis, along
     capsules[:, 6], capsules[:, 8] = 1 / squared, 1 / np.maximum(squared - along * along, 1e-9)
     capsules[:, 9], capsules[:, 10] = radii, radii * radii
@@ -175,16 +171,14 @@ def _capsules(ends: Float64, radii: Float64) -> Float32:
 def _shade_by_capsules(
     positions: Float32, normals: Float32, rows: Int32, capsules: Float32, past: Float32
 ) -> None:
-    """Write `past` (N, 2): the shares of key light and sky that the capsules let through to vertices `rows`
-    (N,).
+    """Write `past` (N, 2): the shares of key light and sky that capsules let through to vertices `rows` (N,).
 
     One capsule after another and without branches, so that the loops over vertices are vectorised.
 
-    Bounds: rows are vertices of the body, whose positions and normals `shade` checks; past has a row for
-    each.
+    Bounds: rows are vertices of the body, whose arrays `shade` checks; past has a row for each.
     """
     one, zero = np.float32(1.0), np.float32(0.0)
-    kx, ky, kz = np.float32(KEY[0]), np.float32(KEY[1]), np.float32(KEY[2])
+    kx, ky, kz = np.float32(KEY_UNIT[0]), np.float32(KEY_UNIT[1]), np.float32(KEY_UNIT[2])
     count = len(rows)
     x, y, z = np.empty(count, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
     nx, ny, nz = np.empty_like(x), np.empty_like(x), np.empty_like(x)
@@ -196,12 +190,12 @@ def _shade_by_capsules(
     for k in range(len(capsules)):
         cx, cy, cz = capsules[k, 0], capsules[k, 1], capsules[k, 2]
         bx, by, bz = capsules[k, 3], capsules[k, 4], capsules[k, 5]
-        per_way, bk, per_rest = capsules[k, 6], capsules[k, 7], capsules[k, 8]
+        per_axis, bk, per_rest = capsules[k, 6], capsules[k, 7], capsules[k, 8]
         radius, square = capsules[k, 9], capsules[k, 10]
         # The sky: a ball at the nearest point of the axis.
         for i in range(count):
             ax, ay, az = cx - x[i], cy - y[i], cz - z[i]
-            s = min(max(-(ax * bx + ay * by + az * bz) * per_way, zero), one)
+            s = min(max(-(ax * bx + ay * by + az * bz) * per_axis, zero), one)
             dx, dy, dz = ax + s * bx, ay + s * by, az + s * bz
             towards = nx[i] * dx + ny[i] * dy + nz[i] * dz
             per = one / max(dx * dx + dy * dy + dz * dz, np.float32(1e-6))

@@ -1,46 +1,125 @@
-"""A face model as the player shows it: turns FAPs into meshes, eyes and feature points."""
+"""A face model as the player shows it: turns FAPs into meshes, eyeballs and feature points."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from fba.arrays import Float32, Float64
+from fba.arrays import Float32, Float64, Intp
 from fba.face import Deformer, FaceModel, Part
+from fba.face.eyeball import fit_sphere, flat_width
 from fba.face.model import point_row
+from fba.geometry import fit_similarity
 from fba.parameters import FAP_COUNT
-from fba_player._figure._eyeball import Eyeball, find_eyeball
 from fba_player._figure._face_parts import (
     compute_sway,
     detail_levels,
-    known_middle,
     make_shape,
+    middle_of_points,
     part_rows,
     with_triangles,
 )
 from fba_player._figure.face_light import MOUTH_OPEN, FaceLight
+from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
-from fba_player.view._geometry import rotation_vector
+from fba_player.view._geometry import rotation_vector, transform
 from fba_player.view._view import Eye, FaceMesh, FaceShape
 from fba_player.view.camera import Subject
 
+MAX_ROUNDNESS_ERROR = 0.03
+"""A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""
+MIN_BALL_VERTICES = 12
+"""A part with fewer vertices is not an eyeball; with fewer behind the pupil, all give its rotation."""
+SAMPLED_VERTICES = 96
+"""Vertices from which an eyeball's rotation is computed."""
+PUPIL_FAPS = (29, 30)
+"""FAPs that dilate the left and the right pupil."""
+LID_POINTS = (("3.1", "3.3", "3.7", "3.11"), ("3.2", "3.4", "3.12", "3.8"))
+"""Feature points of the left and right eye: middles of upper and lower lid, outer and inner corner."""
+OPEN_LIDS = np.array([[0.0, 0.5, 0.86], [0.0, -0.5, 0.86], [1.0, 0.0, 0.3], [-1.0, 0.0, 0.3]])
+"""These points of an open eye, relative to its centre, in radii."""
 MIN_SWAY_ON_BODY = 0.45
 """On a body, vertices that turn with the head by less than this share are left out: the body has a neck."""
 
 GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
            6: 200, 7: 200, 53: 200, 54: 200}  # fmt: skip
 """FAPs that close the eyes, raise the brows and widen the mouth: a pose that levels of detail preserve."""
-EYES_APART = 0.062
-"""Distance between an adult's pupils, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Eyeball:
+    """One eyeball in the neutral face. side: 0 left, 1 right. centre: (3,), and radius, metres.
+
+    rows: sampled vertices of the part, away from the pupil. neutral: their positions. lids: the model's
+    vertices at `LID_POINTS`, -1 for missing ones. iris, pupil: diameters (m). step: change of the pupil's
+    diameter for one unit of FAP 29 or 30.
+    """
+
+    side: int
+    centre: Float64
+    radius: float
+    rows: Intp
+    neutral: Float64
+    lids: tuple[int, ...]
+    iris: float
+    pupil: float
+    step: float
+
+    def pose(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
+        """Return the eye for moved vertices (V, 3) of its part and of the face, put into the world."""
+        moved = part.take(self.rows, axis=0).astype(np.float64)
+        fitted = fit_similarity(self.neutral, moved)
+        turn, centre = fitted.rotation, fitted.target + fitted.rotation @ (self.centre - fitted.centre)
+        frame = np.eye(4)
+        frame[:3, :3] = turn * self.radius
+        frame[:3, 3] = centre
+        pupil = self.pupil + self.step * float(faps[PUPIL_FAPS[self.side] - 1])
+        iris = self.iris / 2 / self.radius
+        return Eye(
+            matrix @ frame,
+            iris,
+            min(max(pupil / 2 / self.radius, 0.03), iris * 0.92),
+            self._lid_positions(face, centre),
+            matrix[:3, :3] / math.sqrt(matrix[:3, 0] @ matrix[:3, 0]),
+        )
+
+    def _lid_positions(self, face: Float32, centre: Float64) -> Float64:
+        """Return the lid points (4, 3) from the centre, in radii; for missing ones, those of an open eye."""
+        lids = np.array(self.lids)
+        return np.where(lids[:, None] >= 0, (face.take(lids, axis=0) - centre) / self.radius, OPEN_LIDS)
+
+
+def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
+    """Return the sphere that fits a part, or None if it is not round."""
+    vertices = part.vertices.astype(np.float64)
+    if len(vertices) < MIN_BALL_VERTICES or flat_width(part) is not None:
+        return None
+    on_sphere = np.ones(len(vertices), dtype=bool)
+    for _ in range(4):  # without what stands out, such as a cornea
+        centre, radius, _ = fit_sphere(vertices[on_sphere])
+        away = np.abs(np.linalg.norm(vertices - centre, axis=1) - radius)
+        on_sphere = away <= max(float(np.quantile(away, 0.7)), 1e-9)
+    if not np.isfinite(radius) or radius <= 0 or float(np.median(away)) > MAX_ROUNDNESS_ERROR * radius:
+        return None
+    if float(np.ptp(vertices, axis=0).max()) > 2.4 * radius:
+        return None
+    side = 0 if centre[0] > 0 else 1
+    behind = np.flatnonzero((vertices[:, 2] - centre[2]) < 0.75 * radius)
+    if len(behind) < MIN_BALL_VERTICES:
+        behind = np.arange(len(vertices))
+    rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED_VERTICES).astype(int))]
+    unit = model.fapu.IRISD
+    lids = tuple(int(model.bound[point_row(name)]) for name in LID_POINTS[side])
+    return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The face for one set of FAPs (68,): positions and normals, float32 (V, 3), without the head's turn
-    (4, 4)."""
+    """The face for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4)."""
 
     faps: Float32
     positions: Float32
@@ -73,16 +152,14 @@ class FaceFigure:
     @cached_property
     def between_eyes(self) -> Float64:
         """(3,) the point between the pupils, metres, in the frame of the model."""
-        eyes = [self.model.points[point_row(name)] for name in ("3.5", "3.6")]
-        middle: Float64 = np.mean(eyes, axis=0)
-        return middle
+        return np.asarray(self.model.points[[point_row("3.5"), point_row("3.6")]].mean(axis=0))
 
     @cached_property
     def subject(self) -> Subject:
         """What a camera should have in view: the head from its top to the upper chest."""
         model = self.model
         head = np.concatenate([part.vertices for part in model.of_kind("skin") or model.parts])
-        chin = known_middle(model, ("2.10", "2.1"))
+        chin = middle_of_points(model, ("2.10", "2.1"))
         tall = model.fapu.ENS * 1024 * 5.2
         top = float(head[:, 1].max())
         low = float(chin[1]) if chin is not None else top - tall
@@ -119,15 +196,12 @@ class FaceFigure:
             if self.model.part(name).kind in without or not len(shape.triangles):
                 continue
             rows = self.rows(name)
-            positions, normals = pose.positions[rows], pose.normals[rows]
-            meshes.append(
-                FaceMesh(shape, positions, normals, light[rows], matrix, axis, self.centre, wrinkles=wrinkles)
-            )
+            part = pose.positions[rows], pose.normals[rows], light[rows]
+            meshes.append(FaceMesh(shape, *part, matrix, axis, self.centre, wrinkles=wrinkles))
         return meshes
 
     def rows(self, name: str) -> slice:
-        """Return the slice of a part's vertices in the arrays of the model. Raises KeyError for an unknown
-        name."""
+        """Return the slice of a part's vertices in the arrays of the model; KeyError for an unknown name."""
         return part_rows(self.model, name)
 
     def shade(self, faps: Float32, frame: Float64) -> Float32:
@@ -150,11 +224,8 @@ class FaceFigure:
         ]
 
     def points(self, faps: Float32, matrix: Float64) -> Float64:
-        """Return float64 (84, 3): feature points in the world for FAPs (68,); NaN for those that the face
-        lacks."""
-        points = self.deformer.feature_points(faps)
-        moved: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
-        return moved
+        """Return float64 (84, 3): feature points in the world for FAPs (68,); NaN for missing ones."""
+        return transform(self.deformer.feature_points(faps), matrix)
 
     @cached_property
     def _shapes_on_body(self) -> dict[str, FaceShape]:
@@ -196,9 +267,8 @@ def _extreme_positions(deformer: Deformer, faps: dict[int, int]) -> Float32:
 
 def _head_centre(model: FaceModel) -> Float64:
     """Return (3,): the centre of the head's rotation in its tables; the origin if they do not turn it."""
-    for number in (48, 49, 50):
-        table = model.table_of.get(number)
-        for transform in table.transforms if table is not None else ():
-            if transform.kind == "rotation":
-                return np.array(transform.centre)
+    tables = [model.table_of[number] for number in (48, 49, 50) if number in model.table_of]
+    for turn in (turn for table in tables for turn in table.transforms):
+        if turn.kind == "rotation":
+            return np.array(turn.centre)
     return np.zeros(3)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
-from fba.cache import load_or_make
-from fba.compiled import is_compiled
+from fba.cache import load_or_make, make_key
+from fba.compiled import compiled, is_compiled
 from fba.face import Deformer, FaceModel
 from fba.face.model import point_row
-from fba_player._figure._face_light_loops import Table, blend_swaying, light_vertices
 from fba_player._figure._face_parts import part_rows
 from fba_player._figure.occlusion import CACHE_VERSION, HARMONICS, Visibility, bake, weights
 
@@ -37,8 +36,10 @@ MIN_SWAY = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """Visibility with the mouth shut and wide open; near: bool (V,), where these differ; gaps: distances of
-    the lips in both, metres."""
+    """Visibility with the mouth shut and wide open.
+
+    near: bool (V,), where these differ. gaps: distances of the lips in both, metres.
+    """
 
     shut: Visibility
     wide: Visibility
@@ -83,9 +84,8 @@ class FaceLight:
         light = np.empty((len(self._sway), 4), dtype=np.float32)
         for part, baked in zip(self._model.parts, self._part_lights, strict=True):
             # Teeth get more light than falls in, as a photographer would have it.
-            baked.shade(
-                share, lights, TEETH_FILL_SHARE * share if part.kind == "teeth" else 0.0, light[baked.rows]
-            )
+            added = TEETH_FILL_SHARE * share if part.kind == "teeth" else 0.0
+            baked.shade(share, lights, added, light[baked.rows])
         for rows, outside in zip(self._tongues, out, strict=True):
             if outside.any():
                 light[rows] += (np.array(FREE_LIGHT, dtype=np.float32) - light[rows]) * outside[:, None]
@@ -93,10 +93,8 @@ class FaceLight:
 
     @cached_property
     def _part_lights(self) -> list[_PartLight]:
-        return [
-            _part_light(self.baked, part_rows(self._model, part.name), self._sway)
-            for part in self._model.parts
-        ]
+        parts = self._model.parts
+        return [_part_light(self.baked, part_rows(self._model, part.name), self._sway) for part in parts]
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
@@ -106,20 +104,16 @@ class FaceLight:
 
     def _gap(self, positions: Float32) -> float:
         assert self._lips is not None
-        way = positions[self._lips[0]] - positions[self._lips[1]]
-        return math.sqrt(float(way @ way))
+        between = positions[self._lips[0]] - positions[self._lips[1]]
+        return math.sqrt(float(between @ between))
 
     def _out_of_mouth(self, depths: Float32, positions: Float32) -> Float32:
-        """Return float32 (N,), 0..1: how far vertices of a tongue at these depths (z) are out between the
-        lips."""
-        if self._lips is None:
+        """Return float32 (N,), 0..1: how far vertices of a tongue at depths (z) are out between the lips."""
+        lips = math.inf if self._lips is None else float(positions[self._lips, 2].min())
+        if depths.max(initial=-math.inf) <= lips:  # the usual case
             return np.zeros(len(depths), dtype=np.float32)
         reach = 0.12 * self._model.fapu.ENS * 1024
-        lips = min(positions[self._lips[0], 2], positions[self._lips[1], 2])
-        if depths.max(initial=lips) <= lips:  # the usual case
-            return np.zeros(len(depths), dtype=np.float32)
-        share: Float32 = np.clip((depths - lips) / reach, 0.0, 1.0)
-        return share.astype(np.float32)
+        return np.asarray(np.clip((depths - lips) / reach, 0.0, 1.0), dtype=np.float32)
 
     @cached_property
     def baked(self) -> Baked:
@@ -139,7 +133,7 @@ class FaceLight:
         wide = cached_visibility(moved, normals, triangles, near)
         arrays = [
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
-            for before, after in zip(shut.arrays, wide.arrays, strict=True)
+            for before, after in zip(shut, wide, strict=True)
         ]
         return Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
 
@@ -155,19 +149,36 @@ class FaceLight:
 
 
 def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
-    """Return what `bake` returns, stored in the disk cache: computing it takes half a second of every
-    start."""
+    """Return what `bake` returns, stored in the disk cache: it takes half a second of every start."""
 
     def make() -> list[Float16]:
-        return [array.astype(np.float16) for array in bake(positions, normals, triangles, within).arrays]
+        return [array.astype(np.float16) for array in bake(positions, normals, triangles, within)]
 
-    digest = hashlib.sha256(CACHE_VERSION.encode())
-    for array in (positions, normals, triangles, within):
-        digest.update(np.ascontiguousarray(array).data)
     count = len(within)
     shapes = ((count, HARMONICS), (count, HARMONICS), (count,))
-    arrays = load_or_make(f"light-{digest.hexdigest()[:32]}", shapes, make) if is_compiled() else make()
+    key = make_key("light", CACHE_VERSION, positions, normals, triangles, within)
+    arrays = load_or_make(key, shapes, make) if is_compiled() else make()
     return Visibility(*(array.astype(np.float32) for array in arrays))
+
+
+class Table(NamedTuple):
+    """Visibility of N vertices with the mouth shut, and, of the M
+    vertices near it, with the mouth wide open. A row for each harmonic: loops over vertices then run fastest.
+    """
+
+    light: Float32
+    """(16, N)"""
+    through: Float32
+    """(16, N)"""
+    open: Float32
+    """(N,)"""
+    wide_light: Float32
+    """(16, M)"""
+    wide_through: Float32
+    """(16, M)"""
+    wide_open: Float32
+    """(M,)"""
+    near: Intp
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,18 +195,18 @@ class _PartLight:
     still: Table
     sway: Float32
 
-    def shade(self, share: float, lights: Float32, on_teeth: float, light: Float32) -> None:
+    def shade(self, share: float, lights: Float32, added: float, light: Float32) -> None:
         """Write light (N, 4): key light, sky, through, rim light.
 
         share: how far the mouth is wide open. lights: (2, 16), weights of the harmonics for key and rim light
         at vertices that move with the head; where the head has turned, two more rows for vertices at rest.
-        on_teeth: the share of the missing light that is added.
+        added: the share of the missing light that is added.
         """
-        light_vertices(self.table, lights[:2], share, on_teeth, light)
+        _light_vertices(self.table, lights[:2], share, added, light)
         if len(lights) > 2 and len(self.swaying):
             still = np.empty((len(self.swaying), 4), dtype=np.float32)
-            light_vertices(self.still, lights[2:], share, on_teeth, still)
-            blend_swaying(light, still, self.swaying, self.sway)
+            _light_vertices(self.still, lights[2:], share, added, still)
+            _blend_swaying(light, still, self.swaying, self.sway)
 
 
 def _part_light(baked: Baked, rows: slice, sway: Float32) -> _PartLight:
@@ -210,7 +221,7 @@ def _table(baked: Baked, vertices: Intp) -> Table:
     """Return the visibility of some vertices of a model."""
     near = np.flatnonzero(baked.near[vertices])
     shut, wide = (
-        [np.ascontiguousarray(table[rows].T) for table in visibility.arrays]
+        [np.ascontiguousarray(table[rows].T) for table in visibility]
         for visibility, rows in ((baked.shut, vertices), (baked.wide, vertices[near]))
     )
     return Table(shut[0], shut[1], shut[2], wide[0], wide[1], wide[2], near)
@@ -223,3 +234,64 @@ def _basis(*turns: Float64) -> Float32:
         np.dot(LIGHTS, into.T, out=towards[2 * k : 2 * k + 2])
     towards /= np.sqrt(np.einsum("ij,ij->i", towards, towards))[:, None]
     return weights(towards).astype(np.float32)
+
+
+@compiled
+def _light_vertices(table: Table, basis: Float32, wide: float, added: float, light: Float32) -> None:
+    """Write light (N, 4): key light, sky, through, rim light.
+
+    basis: (2, 16), weights of the harmonics for key and rim light. wide: how far the mouth is wide open.
+    added: the share of the missing light that is added.
+    """
+    count = len(table.open)
+    if len(light) < count:
+        raise IndexError("light for fewer vertices than the table's")
+    share, more = np.float32(wide), np.float32(added)
+    key, rim, back = _products(table.light, table.through, basis, count)
+    for i in range(count):
+        light[i, 0], light[i, 1], light[i, 2], light[i, 3] = key[i], table.open[i], back[i], rim[i]
+    if share > 0.0 and len(table.near):
+        key, rim, back = _products(table.wide_light, table.wide_through, basis, len(table.near))
+        for k in range(len(table.near)):
+            i = table.near[k]
+            light[i, 0] += share * (key[k] - light[i, 0])
+            light[i, 1] += share * (table.wide_open[k] - light[i, 1])
+            light[i, 2] += share * (back[k] - light[i, 2])
+            light[i, 3] += share * (rim[k] - light[i, 3])
+    if more > 0.0:
+        for i in range(count):
+            light[i, 0] += more * (np.float32(1.0) - light[i, 0])
+            light[i, 1] += more * (np.float32(1.0) - light[i, 1])
+
+
+@compiled
+def _blend_swaying(light: Float32, still: Float32, rows: Intp, share: Float32) -> None:
+    """Blend rows of light (N, 4) with `still` (M, 4), that at rest, by shares (M,) of the head's motion."""
+    for k in range(len(rows)):
+        for column in range(4):
+            light[rows[k], column] = still[k, column] + share[k] * (light[rows[k], column] - still[k, column])
+
+
+@compiled
+def _products(
+    light: Float32, through: Float32, basis: Float32, count: int
+) -> tuple[Float32, Float32, Float32]:
+    """Return key light, rim light, and rim light through the skin, each (count,)."""
+    key = np.zeros(count, dtype=np.float32)
+    rim, back = np.zeros_like(key), np.zeros_like(key)
+    for k in range(0, basis.shape[1], 4):  # four at a time: the sums are read and written less often
+        a, b, c, d = basis[0, k], basis[0, k + 1], basis[0, k + 2], basis[0, k + 3]
+        e, f, g, h = basis[1, k], basis[1, k + 1], basis[1, k + 2], basis[1, k + 3]
+        one, two, three, four = light[k], light[k + 1], light[k + 2], light[k + 3]
+        for i in range(count):
+            key[i] += a * one[i] + b * two[i] + c * three[i] + d * four[i]
+            rim[i] += e * one[i] + f * two[i] + g * three[i] + h * four[i]
+        one, two, three, four = through[k], through[k + 1], through[k + 2], through[k + 3]
+        for i in range(count):
+            back[i] += e * one[i] + f * two[i] + g * three[i] + h * four[i]
+    low, high = np.float32(0.0), np.float32(1.0)
+    for i in range(count):
+        key[i] = min(max(key[i], low), high)
+        rim[i] = min(max(rim[i], low), high)
+        back[i] = min(max(back[i], low), high)
+    return key, rim, back

@@ -14,6 +14,7 @@ from fba.parameters import faps
 SIZES = (0.01, 1.0)
 """Distances between the eyes (m) that are taken for metres: from dolls to giants."""
 EYES_APART = 0.062
+"""Distance between an adult's pupils, metres."""
 EXPECTED = {"eye": "eyes", "teeth": "teeth"}
 
 
@@ -50,8 +51,8 @@ def resize(model: FaceModel, factor: float) -> FaceModel:
 
 def _resize_table(table: FaceDefTables, factor: float) -> FaceDefTables:
     # Displacements are in the face's own units; angles scale only if the FAP's unit is a length.
-    angle = 1.0 if faps()[table.fap - 1].unit == "AU" else 1.0 / factor
-    shift = factor if faps()[table.fap - 1].unit == "AU" else 1.0
+    is_angle = faps()[table.fap - 1].unit == "AU"
+    shift, angle = (factor, 1.0) if is_angle else (1.0, 1.0 / factor)
     transforms = []
     for transform in table.transforms:
         by = shift if transform.kind == "translation" else angle

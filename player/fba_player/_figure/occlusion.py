@@ -6,8 +6,8 @@ soft shadows of large lights then cost a few products for each vertex, whichever
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ DIRECTIONS = 72
 PIXEL_SIZE = 0.0014
 """Size of a depth map's pixel, metres: finer than the folds that are to be shaded."""
 MAX_DEPTH_PIXELS = 400
+"""Largest width of a depth map, pixels."""
 SOFTNESS = (1.0, 0.92, 0.72, 0.46)
 """Factor for each band of the harmonics, for a light some 40 degrees wide."""
 SKIN_DEPTH = 0.0045
@@ -28,28 +29,20 @@ CACHE_VERSION = "1"
 """Cache version; increment when `bake` gives other results."""
 
 
-@dataclass(frozen=True, eq=False)
-class Visibility:
-    """light: float32 (V, 16), harmonics of the visibility of each direction, 1 if free. through: float32 (V,
-    16), harmonics of the light through the skin from behind. open: float32 (V,), the unobstructed share of
-    the hemisphere above each vertex, weighted by the cosine."""
+class Visibility(NamedTuple):
+    """Light that reaches each vertex.
+
+    light: float32 (V, 16), harmonics of the visibility of each direction, 1 if free. through: float32
+    (V, 16), harmonics of the light through the skin from behind. open: float32 (V,), the unobstructed share
+    of the hemisphere above each vertex, weighted by the cosine.
+    """
 
     light: Float32
     through: Float32
     open: Float32
 
-    @property
-    def arrays(self) -> tuple[Float32, Float32, Float32]:
-        """(light, through, open)."""
-        return self.light, self.through, self.open
 
-
-def bake(
-    vertices: Float32,
-    normals: Float32,
-    triangles: Int32,
-    within: Bool | None = None,
-) -> Visibility:
+def bake(vertices: Float32, normals: Float32, triangles: Int32, within: Bool | None = None) -> Visibility:
     """Return the visibility of every vertex (V, 3) of a mesh; takes about half a second for 20,000 vertices.
 
     within: bool (V,), the vertices whose visibility is computed, all by default; others may count as free.
@@ -83,19 +76,16 @@ def bake(
 
 def weights(directions: Float64) -> Float64:
     """Return float64 (N, 16): weights for rows of `Visibility`, for large lights in directions (N, 3)."""
-    return harmonics(directions) * _bands()
-
-
-def harmonics(directions: Float64) -> Float64:
-    """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
-    values = np.empty((len(directions), HARMONICS))
-    _harmonics(np.ascontiguousarray(directions, dtype=np.float64), values)
-    return values
+    return np.asarray(harmonics(directions) * np.repeat(SOFTNESS, [1, 3, 5, 7]))
 
 
 @compiled
-def _harmonics(directions: Float64, values: Float64) -> None:
-    """Write `harmonics`. Bounds: values are made for directions, with HARMONICS columns."""
+def harmonics(directions: Float64) -> Float64:
+    """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3).
+
+    Bounds: values are made here, with HARMONICS columns.
+    """
+    values = np.empty((len(directions), HARMONICS))
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
         values[i, 0] = 0.282095
@@ -114,11 +104,7 @@ def _harmonics(directions: Float64, values: Float64) -> None:
         values[i, 13] = 0.457046 * x * (5 * z * z - 1)
         values[i, 14] = 1.445306 * z * (x * x - y * y)
         values[i, 15] = 0.590044 * x * (x * x - 3 * y * y)
-
-
-@cache
-def _bands() -> Float64:
-    return np.repeat(SOFTNESS, [1, 3, 5, 7])
+    return values
 
 
 @cache
@@ -229,10 +215,7 @@ def _read_depths(
             weight = (fx if right else 1.0 - fx) * (fy if down else 1.0 - fy)
             gap = (depth[row + down, column + right] - seen[i, 2]) * reach
             free += weight * min(max(2.0 - gap / slant, 0.0), 1.0)
-            if gap > 0.5 * pixel:
-                behind += weight * np.exp(-gap / SKIN_DEPTH)
-            else:
-                behind += weight
+            behind += weight * (np.exp(-gap / SKIN_DEPTH) if gap > 0.5 * pixel else 1.0)
         visible[i] = free
         if facing[i] < 0.1:
             through[i] = behind * min(1.0, (0.1 - facing[i]) * 4.0)

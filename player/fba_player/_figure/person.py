@@ -19,7 +19,8 @@ from fba_player._figure.face import FaceFigure
 from fba_player._figure.wrinkles import wrinkle_strengths
 from fba_player.view._view import Eye, FaceMesh, FaceShape
 
-SCATTER = {"skin": 1.0, "neck": 1.0}
+SCATTERING_KINDS = ("skin", "neck")
+"""Kinds of a body's parts below whose surface light scatters."""
 WEIGHT_PROJECTIONS = 6
 """Number of random projections of the skin weights that simplification preserves."""
 WEIGHT_SCALE = 0.02
@@ -59,11 +60,9 @@ class Person:
     def joints(self, faps: Float32, matrices: Float64) -> Float64:
         """Return the joint matrices (J, 4, 4) with the head turned on the skull base by FAPs (68,)."""
         turn = self.figure.pose(faps).turn
-        return (
-            turn_own_head(self.body, matrices, turn)
-            if self.head is None
-            else self.head.matrices(matrices, turn)
-        )
+        if self.head is None:
+            return turn_own_head(self.body, matrices, turn)
+        return self.head.matrices(matrices, turn)
 
     def frame(self, joints: Float64) -> Float64:
         """Return (4, 4): from the face model's frame into the world."""
@@ -76,14 +75,13 @@ class Person:
         return frame
 
     def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
-        """Return all parts but the eyeballs for FAPs (68,) and joint matrices that contain the head's
-        turn."""
+        """Return all parts but the eyeballs for FAPs (68,) and joint matrices as `joints` returns them."""
         positions, normals = np.empty_like(self.body.vertices), np.empty_like(self.body.vertices)
-        own = self.body.own_head if self.head is None else None
-        if own is None:
+        own_head = self.body.own_head if self.head is None else None
+        if own_head is None:
             self.body.skin(joints, positions, normals)
         else:
-            moved = own.move(self.body.vertices, faps)
+            moved = own_head.move(self.body.vertices, faps)
             self.body.skinner.skin_vertices(moved, self.body.normals, joints, positions, normals)
         light = self.light.shade(positions, normals, joints)
         meshes = [
@@ -103,7 +101,7 @@ class Person:
         return meshes
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
-        """Return the eyeballs for FAPs (68,) and joint matrices that contain the head's turn."""
+        """Return the eyeballs for FAPs (68,) and joint matrices as `joints` returns them."""
         return [] if self.head is None else self.figure.eyes(faps, self.frame(joints), turned=True)
 
 
@@ -114,40 +112,35 @@ def build_person(body: BodyModel, figure: FaceFigure) -> Person:
     wholly below the chin. A body without such a place keeps its own head, which FAPs turn.
     """
     model = figure.model
-    if body.eyes is None:
+    head, face_shapes, left_out = None, dict[str, FaceShape](), tuple[str, ...]()
+    if body.eyes is not None:
+        skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
+        eyes = model.points[[point_row("3.5"), point_row("3.6")]]
+        head = attach_head(body, model.vertices, eyes, skull)
+        face_shapes = _face_shapes(figure, head)
+        left_out = ("head", "neck") if head.brings_neck else ("head",)
+    shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts if part.kind not in left_out}
+    if head is None:
         rows = head_rows(body)
-        shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts}
         for name, shape in shapes.items():  # a coarser face would let its teeth and eyes through
             if rows[part_rows(body, name)].mean() > HEAD_SHARE:
                 shapes[name] = replace(shape, coarser=None)
-        light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
-        return Person(body, figure, None, shapes, {}, light)
-    skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
-    eyes = model.points[[point_row("3.5"), point_row("3.6")]]
-    head = attach_head(body, model.vertices, eyes, skull)
-    left_out = ("head", "neck") if head.brings_neck else ("head",)
-    shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts if part.kind not in left_out}
     light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
-    return Person(body, figure, head, shapes, _face_shapes(figure, head), light)
+    return Person(body, figure, head, shapes, face_shapes, light)
 
 
 def head_rows(body: BodyModel) -> Bool:
     """Return the mask (V,) of the body's vertices that its skull carries more than any other joint."""
     below = body.skeleton.descendants(skull_of(body))
-    mask: Bool = np.isin(body.joints[:, 0], below) & (body.weights[:, 0] > 0)
-    return mask
+    return np.asarray(np.isin(body.joints[:, 0], below) & (body.weights[:, 0] > 0))
 
 
 def head_middle(body: BodyModel) -> Float64:
-    """Return the middle (3,) of the body's own head, as modelled; without one, the joint that carries
-    heads."""
-    rows = head_rows(body)
-    if not rows.any():
-        joint: Float64 = body.bind[skull_of(body), :3, 3]
-        return joint
-    of_head = body.vertices[rows].astype(np.float64)
-    middle: Float64 = (of_head.min(axis=0) + of_head.max(axis=0)) / 2
-    return middle
+    """Return the middle (3,) of the body's own head, as modelled; else of the joint that carries heads."""
+    of_head = body.vertices[head_rows(body)].astype(np.float64)
+    if not len(of_head):
+        return np.asarray(body.bind[skull_of(body), :3, 3])
+    return np.asarray((of_head.min(axis=0) + of_head.max(axis=0)) / 2)
 
 
 def turn_own_head(body: BodyModel, matrices: Float64, turn: Float64) -> Float64:
@@ -158,10 +151,9 @@ def turn_own_head(body: BodyModel, matrices: Float64, turn: Float64) -> Float64:
     if np.array_equal(turn, np.eye(4)):
         return matrices
     skull = skull_of(body)
-    within = np.eye(4)
+    bind, within = body.bind[skull], np.eye(4)
     within[:3, :3] = turn[:3, :3]
-    within[:3, 3] = body.bind[skull, :3, 3] - turn[:3, :3] @ body.bind[skull, :3, 3]
-    bind = body.bind[skull]
+    within[:3, 3] = bind[:3, 3] - turn[:3, :3] @ bind[:3, 3]
     motion = matrices[skull] @ np.linalg.inv(bind) @ within @ bind @ np.linalg.inv(matrices[skull])
     turned = matrices.copy()
     below = body.skeleton.descendants(skull)
@@ -189,21 +181,15 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
     # Vertices must remain where joints bend the body: preserve the weights, in a few fixed projections.
     random = np.random.default_rng(7).standard_normal((joints, WEIGHT_PROJECTIONS)) / WEIGHT_PROJECTIONS**0.5
     carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * WEIGHT_SCALE
-    coarser = detail_levels(part, [part.vertices], carried.astype(np.float32))
     open_surface = part.material.two_sided
     return replace(
-        shape,
-        scatter=SCATTER.get(part.kind, 0.0),
-        two_sided=open_surface,
-        closed=not open_surface,
-        name="",
-        coarser=coarser,
-    )
+        shape, scatter=float(part.kind in SCATTERING_KINDS), two_sided=open_surface, closed=not open_surface,
+        name="", coarser=detail_levels(part, [part.vertices], carried.astype(np.float32)),
+    )  # fmt: skip
 
 
 def _mesh_in_world(
     shape: FaceShape, rows: slice, positions: Float32, normals: Float32, light: Float32
 ) -> FaceMesh:
-    """Return a part, cut from its model's arrays (V, 3), (V, 3) and (V, 4), which are in the world
-    already."""
+    """Return a part, cut from its model's arrays (V, 3), (V, 3) and (V, 4) in the world."""
     return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NO_TURN, NO_TURN)

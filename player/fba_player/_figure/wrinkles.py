@@ -28,8 +28,7 @@ MAP_POINTS = {
     "8.1": (0.000, -0.997), "8.2": (0.000, -1.299), "8.3": (0.442, -1.121),
     "5.3": (0.690, -0.501), "2.10": (0.000, -1.612), "11.1": (0.000, 1.158),
 }  # fmt: skip
-"""Where feature points lie in the map: to the left of the face's middle and above the pupils, in eye
-separations (ES)."""
+"""Where feature points lie in the map: left of the middle and above the pupils, in eye separations (ES)."""
 MIRRORED = {
     "3.7": "3.12", "3.11": "3.8", "3.9": "3.10", "3.13": "3.14", "4.1": "4.2", "4.3": "4.4", "4.5": "4.6",
     "9.1": "9.2", "8.3": "8.4", "5.3": "5.4",
@@ -70,15 +69,17 @@ def wrinkle_strengths(faps: Float32) -> Float32:
 
 
 def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
-    """Return float32 (V, 2): where the vertices of a part lie in the map, x positive on the face's left;
-    outside of it where they have no wrinkles. None for parts other than skin, and for faces that show no
-    wrinkles or lack the points needed."""
+    """Return float32 (V, 2): where the vertices of a part lie in the map, x positive on the face's left.
+
+    Vertices without wrinkles lie outside of it. None for parts other than skin, and for faces that show no
+    wrinkles or lack the points needed.
+    """
     if not model.wrinkles or part.kind != "skin":
         return None
-    own, shown = _known_points(model)
-    if own is None or shown is None:
+    points = _points_in_map(model)
+    if points is None:
         return None
-    spline = _ThinPlate(own, shown)
+    spline = _ThinPlate(*points)
     flat = _in_front(model, part.vertices.astype(np.float64))
     places = spline(flat[:, :2])
     behind = flat[:, 2] < -MAX_DEPTH
@@ -89,25 +90,24 @@ def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
 def _in_front(model: FaceModel, positions: Float64) -> Float64:
     """Return the positions (N, 3) relative to the middle of the pupils, in eye separations."""
     middle = model.points[[point_row("3.5"), point_row("3.6")]].mean(axis=0)
-    away: Float64 = (positions - middle) / (model.fapu.ES * 1024)
-    return away
+    return np.asarray((positions - middle) / (model.fapu.ES * 1024))
 
 
-def _known_points(model: FaceModel) -> tuple[Float64, Float64] | tuple[None, None]:
+def _points_in_map(model: FaceModel) -> tuple[Float64, Float64] | None:
     """Return the points (N, 2) of a face that have places in the map, and these places (N, 2)."""
-    own, shown = [], []
+    positions, places = [], []
     for name, (x, y) in MAP_POINTS.items():
-        for side, point in ((1, name), (-1, MIRRORED.get(name, ""))):
-            position = model.points[point_row(point)] if point else np.full(3, np.nan)
+        for side, point in ((1, name), (-1, MIRRORED.get(name))):
+            if point is None:
+                continue
+            position = model.points[point_row(point)]
             if np.isfinite(position).all():
-                own.append(position)
-                shown.append((side * x, y))
-            elif name in NEEDED and point:
-                return None, None
-    pupils = model.points[[point_row("3.5"), point_row("3.6")]]
-    if not np.isfinite(pupils).all():
-        return None, None
-    return _in_front(model, np.array(own))[:, :2], np.array(shown)
+                positions.append(position)
+                places.append((side * x, y))
+            elif name in NEEDED:
+                return None
+    flat = _in_front(model, np.array(positions))[:, :2]
+    return (flat, np.array(places)) if np.isfinite(flat).all() else None  # not without the pupils
 
 
 class _ThinPlate:
@@ -126,12 +126,10 @@ class _ThinPlate:
     def __call__(self, places: Float64) -> Float64:
         """Return the spline (N, 2) at places (N, 2)."""
         basis = np.column_stack([_bending(places, self._points), np.ones(len(places)), places])
-        values: Float64 = basis @ self._weights
-        return values
+        return np.asarray(basis @ self._weights)
 
 
 def _bending(places: Float64, points: Float64) -> Float64:
     """Return (N, M): r^2 log r of the distances between places (N, 2) and points (M, 2)."""
     squared = ((places[:, None] - points[None]) ** 2).sum(axis=2)
-    bending: Float64 = 0.5 * squared * np.log(np.maximum(squared, 1e-30))
-    return bending
+    return np.asarray(0.5 * squared * np.log(np.maximum(squared, 1e-30)))

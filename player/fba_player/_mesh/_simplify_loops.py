@@ -208,12 +208,11 @@ def _find_neighbours(fans: Fans, u: int, near: Int32, shared: Int32) -> int:
             v = fans.triangles[fans.owners[o], k]
             if v == u:
                 continue
-            known = -1
-            for i in range(count):
-                if near[i] == v:
-                    known = i
-            if known >= 0:
-                shared[known] += 1
+            place = 0
+            while place < count and near[place] != v:
+                place += 1
+            if place < count:
+                shared[place] += 1
             else:
                 near[count], shared[count] = v, 1
                 count += 1

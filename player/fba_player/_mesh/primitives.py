@@ -8,8 +8,7 @@ from fba.arrays import Float32, Int32
 
 
 def _sheet(rows: int, columns: int) -> Int32:
-    """Return int32 (F, 3): triangles of a band of rows x columns vertices whose last column joins the
-    first."""
+    """Return int32 (F, 3): triangles of rows x columns vertices whose last column joins the first."""
     r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
     a, b = r * columns + c, r * columns + (c + 1) % columns
     both = np.stack([a, b, b + columns, a, b + columns, a + columns], axis=-1)
@@ -17,8 +16,10 @@ def _sheet(rows: int, columns: int) -> Int32:
 
 
 def capsule_mesh(around: int = 20, cap: int = 6) -> tuple[Float32, Int32]:
-    """Return the vertices (V, 4) and triangles (F, 3) of a capsule: a point on the unit sphere, y along the
-    axis, and the end that it belongs to, 0 or 1."""
+    """Return the vertices (V, 4) and triangles (F, 3) of a capsule.
+
+    A vertex is a point on the unit sphere, y along the axis, and the end that it belongs to, 0 or 1.
+    """
     lower = np.linspace(-np.pi / 2, 0, cap + 1)
     latitudes = np.concatenate([lower, -lower[::-1]])
     ends = np.repeat([0.0, 1.0], cap + 1)

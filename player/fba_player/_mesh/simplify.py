@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Int32
-from fba.cache import load_or_make
+from fba.cache import load_or_make, make_key
 from fba.compiled import is_compiled
 
 TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064)
@@ -37,8 +36,7 @@ class DetailLevels:
     triangles: Int32
 
     def triangles_within(self, tolerance: float) -> Int32 | None:
-        """Return int32 (F, 3): triangles of the coarsest level whose error is at most `tolerance` (m); None
-        for the mesh as it is."""
+        """Return int32 (F, 3): the coarsest triangles with at most this error (m); None for all."""
         level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
         if level < 0 or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
             return None
@@ -54,15 +52,13 @@ class DetailLevels:
     @cached_property
     def _collapses(self) -> tuple[Int32, Int32]:
         """What `simplify` returns."""
-        digest = hashlib.sha256(CACHE_VERSION.encode())
-        for array in (self.points, self.triangles):
-            digest.update(np.ascontiguousarray(array).data)
 
         def make() -> list[Int32]:
             return list(simplify(self.points.astype(np.float64), self.poses, self.triangles))
 
         count = len(self.points)
-        onto, first = load_or_make(f"coarse-{digest.hexdigest()[:32]}", ((count,), (count,)), make, np.int32)
+        key = make_key("coarse", CACHE_VERSION, self.points, self.triangles)
+        onto, first = load_or_make(key, ((count,), (count,)), make, np.int32)
         if (onto < 0).any() or (onto >= count).any():
             onto, first = make()
         return onto, first
@@ -125,5 +121,4 @@ def _share_positions(positions: Float64) -> Bool:
     """Return bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
     rounded = np.ascontiguousarray(np.round(positions * 1e6).astype(np.int64))
     _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
-    shared: Bool = counts[inverse.ravel()] > 1
-    return shared
+    return np.asarray(counts[inverse.ravel()] > 1)

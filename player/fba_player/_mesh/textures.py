@@ -63,16 +63,13 @@ class FacePicture:
         return _decode(self.data)
 
     def reduced(self, factor: int) -> UInt8:
-        """Return uint8 (h, w, 4): reduced by `factor` each way, as square roots of linear light, and
-        alpha."""
+        """Return uint8 (h, w, 4): reduced by `factor`, as square roots of linear light, and alpha."""
         if factor < 2 or len(self.data) < MIN_CACHED_BYTES:
             return _reduced(self.pixels, factor)
         width, height = (-(-across // factor) for across in self.size)
         key = make_key("texture", CACHE_VERSION, factor, np.frombuffer(self.data, dtype=np.uint8))
-        (pixels,) = load_or_make(
-            key, ((height, width, 4),), lambda: [_reduced(self.pixels, factor)], np.uint8
-        )
-        return pixels
+        shape = (height, width, 4)
+        return load_or_make(key, (shape,), lambda: [_reduced(self.pixels, factor)], np.uint8)[0]
 
 
 def load_picture(data: bytes, *, limits: Limits = DEFAULT_LIMITS) -> FacePicture:
@@ -170,8 +167,7 @@ def linear_light(srgb: Float64) -> Float64:
 
 
 def texture_breadth(positions: Float32, texcoords: Float32, triangles: Int32) -> float:
-    """Return the metres that the whole width of a texture covers on a mesh (a median); 0 where it covers
-    nothing."""
+    """Return the metres that the width of a texture covers on a mesh (a median); 0 if it covers nothing."""
     if not len(triangles):
         return 0.0
     corners, flat = positions[triangles], texcoords[triangles]
@@ -188,8 +184,7 @@ def skin_relief() -> UInt8:
     From pores to the coarser grain seen from further away; always the same, stored in the disk cache.
     """
     key = make_key("relief", RELIEF_CACHE_VERSION, RELIEF_SIZE, NOISE_DEVIATION, NOISE_BANDS)
-    (pixels,) = load_or_make(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)
-    return pixels
+    return load_or_make(key, ((RELIEF_SIZE, RELIEF_SIZE, 3),), lambda: [_make_relief()], np.uint8)[0]
 
 
 def _make_relief() -> UInt8:

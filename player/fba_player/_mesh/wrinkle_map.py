@@ -71,20 +71,10 @@ STROKES: dict[str, tuple[Stroke, ...]] = {
 
 
 def wrinkle_map() -> UInt8:
-    """Return uint8 (H, W, 4): the wrinkles, each in its own channel, around `PLAIN`; stored in the disk
-    cache."""
-    key = make_key(
-        "wrinkles",
-        CACHE_VERSION,
-        TEXELS,
-        EDGE_BRIGHTNESS,
-        EDGE_BELOW,
-        EDGE_BREADTH,
-        END_STEEPNESS,
-        repr(STROKES),
-    )
-    (pixels,) = load_or_make(key, ((*SHAPE, len(WRINKLES)),), lambda: [_draw()], np.uint8)
-    return pixels
+    """Return uint8 (H, W, 4): the wrinkles, each in its own channel, around `PLAIN`, from the disk cache."""
+    lines = (TEXELS, EDGE_BRIGHTNESS, EDGE_BELOW, EDGE_BREADTH, END_STEEPNESS, repr(STROKES))
+    key = make_key("wrinkles", CACHE_VERSION, *lines)
+    return load_or_make(key, ((*SHAPE, len(WRINKLES)),), lambda: [_draw()], np.uint8)[0]
 
 
 def _draw() -> UInt8:

@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from imgui_bundle import imgui
 
 from fba_player._ui import theme
 from fba_player._ui._imgui_renderer import ImguiRenderer
-from fba_player._ui._transport_buttons import Buttons
+from fba_player._ui._transport_buttons import SIDE_MARGIN, Buttons
 from fba_player._ui.panels.panel import EITHER_BUTTON, STANDING
 from fba_player._ui.ruler import Ruler, label
 from fba_player.playback.timeline import clock_text
-from fba_player.session._emotion_trace import stretch_at
 from fba_player.session._session import Session
-from fba_player.session._timeline_trace import trace_picture
+from fba_player.session._timeline_trace import stretch_at, trace_picture
 
 HEIGHT = 124.0
 """Height of the bar in points."""
 LOW_HEIGHT = 60.0
 """Height in windows that have room for the timeline only."""
-MARGIN = 18.0
-TOP = 24.0
-TRACK = 40.0
-BUTTONS = TOP + TRACK + 13.0
-STRIP = (4.0, 9.0)
+TRACK_TOP = 24.0
+TRACK_HEIGHT = 40.0
+BUTTONS = TRACK_TOP + TRACK_HEIGHT + 13.0
+"""Upper edge and height of the timeline, and the upper edge of the buttons, in points."""
+STRIP_EDGES = (4.0, 9.0)
 """Upper and lower edge of the strip of expressions, in points below the timeline."""
 GRIP_DISTANCE = 7.0
 """Distance in points within which the mouse grabs a mark."""
@@ -62,7 +60,7 @@ class Bar:
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (1, 1))
         imgui.begin("##bar", None, STANDING)
         imgui.pop_style_var(4)
-        margin = min(MARGIN, wide * 0.05)
+        margin = min(SIDE_MARGIN, wide * 0.05)
         self._timeline(session, Ruler(*_span(session), margin, wide - margin), high - tall)
         if tall == HEIGHT:
             self.buttons.draw(session, wide, high - tall + BUTTONS)
@@ -71,16 +69,13 @@ class Bar:
     def _timeline(self, session: Session, ruler: Ruler, y: float) -> None:
         transport = session.transport
         to = imgui.get_window_draw_list()
-        top, bottom = y + TOP, y + TOP + TRACK
+        top, bottom = y + TRACK_TOP, y + TRACK_TOP + TRACK_HEIGHT
         self.area = (ruler.left, top, ruler.right, bottom)
         if ruler.right - ruler.left < 8:
             return
         imgui.set_cursor_screen_pos((ruler.left - GRIP_DISTANCE, y + 4))
-        imgui.invisible_button(
-            "timeline",
-            (ruler.right - ruler.left + 2 * GRIP_DISTANCE, TOP - 4 + TRACK),
-            EITHER_BUTTON,
-        )
+        size = (ruler.right - ruler.left + 2 * GRIP_DISTANCE, TRACK_TOP - 4 + TRACK_HEIGHT)
+        imgui.invisible_button("timeline", size, EITHER_BUTTON)
         hovered = imgui.is_item_hovered()
         self._drag(session, ruler)
         to.add_rect_filled((ruler.left, top), (ruler.right, bottom), theme.packed(theme.LINE), rounding=4.0)
@@ -110,9 +105,11 @@ class Bar:
         if self._held == "head":
             transport.seek(min(time, ruler.high))
         elif self._held == "in":
-            transport.mark_in = min(time, _just_before(transport.mark_out))
+            mark = transport.mark_out  # which stays after it
+            transport.mark_in = time if mark is None else min(time, mark - 1e-3)
         elif self._held == "out":
-            transport.mark_out = max(time, _just_after(transport.mark_in))
+            mark = transport.mark_in
+            transport.mark_out = time if mark is None else max(time, mark + 1e-3)
         elif self._held == "range" and abs(ruler.x(self._from) - x) > 3:
             transport.clear_marks()
             transport.mark_in, transport.mark_out = min(self._from, time), max(self._from, time)
@@ -122,40 +119,34 @@ class Bar:
             return "range"
         marks = {"in": session.transport.mark_in, "out": session.transport.mark_out}
         near = {name: abs(ruler.x(time) - x) for name, time in marks.items() if time is not None}
-        if near:
-            name = min(near, key=lambda one: near[one])
-            if near[name] <= GRIP_DISTANCE and abs(ruler.x(session.transport.time) - x) >= near[name]:
-                return name
-        return "head"
+        name = min(near, key=lambda mark: near[mark], default="head")
+        head = abs(ruler.x(session.transport.time) - x)
+        return name if near and near[name] <= min(GRIP_DISTANCE, head) else "head"
 
     def _draw_trace(self, session: Session, ruler: Ruler, top: float) -> None:
         trace = session.source.trace
         if trace is None:
             return
         scale = session.scale
-        size = (max(round((ruler.right - ruler.left) * scale), 1), max(round((TRACK - 4) * scale), 1))
+        size = (max(round((ruler.right - ruler.left) * scale), 1), max(round((TRACK_HEIGHT - 4) * scale), 1))
         key = (trace, size, ruler.low, ruler.high)
         if self._trace[:-1] != key:
             picture = trace_picture(trace, ruler.low, ruler.high, size)
             self._trace = (*key, self._renderer.set_picture("trace", picture))
         image: Any = self._trace[-1]
         to = imgui.get_window_draw_list()
-        to.add_image(image, (ruler.left, top + 4), (ruler.right, top + TRACK))
+        to.add_image(image, (ruler.left, top + 4), (ruler.right, top + TRACK_HEIGHT))
 
     def _draw_expressions(self, session: Session, to: imgui.ImDrawList, ruler: Ruler, bottom: float) -> None:
         """Draw the expressions that the face shows, the stronger the less transparent."""
-        for one in session.source.expressions:
-            colour = theme.FEELINGS.get(one.label)
-            if colour is None or not one.shows:
+        for stretch in session.source.expressions:
+            colour = theme.FEELINGS.get(stretch.label)
+            if colour is None or not stretch.shows:
                 continue
-            left, right = ruler.x(one.start), min(ruler.x(one.end), ruler.right)
-            alpha = 0.35 + 0.65 * one.intensity / 100
-            to.add_rect_filled(
-                (left, bottom + STRIP[0]),
-                (max(right, left + 1), bottom + STRIP[1]),
-                theme.packed(colour, alpha),
-                rounding=2.0,
-            )
+            left, right = ruler.x(stretch.start), min(ruler.x(stretch.end), ruler.right)
+            alpha = 0.35 + 0.65 * stretch.intensity / 100
+            corners = (left, bottom + STRIP_EDGES[0]), (max(right, left + 1), bottom + STRIP_EDGES[1])
+            to.add_rect_filled(*corners, theme.packed(colour, alpha), rounding=2.0)
 
     def _scale(self, to: imgui.ImDrawList, ruler: Ruler, y: float, bottom: float) -> None:
         if self._ticks[0] != ruler:
@@ -166,29 +157,21 @@ class Bar:
         for x in small:
             to.add_line((x, bottom - 3), (x, bottom), faint)
         for x, left, text in large:
-            to.add_line((x, y + TOP), (x, bottom), line)
+            to.add_line((x, y + TRACK_TOP), (x, bottom), line)
             to.add_text(font, 12.0, (left, y + 5), colour, text)
 
     def _marks(self, session: Session, to: imgui.ImDrawList, ruler: Ruler, top: float, bottom: float) -> None:
         dark = theme.packed((0.05, 0.055, 0.06, 0.62))
-        for time, way, edge in (
-            (session.transport.mark_in, 1.0, ruler.left),
-            (session.transport.mark_out, -1.0, ruler.right),
-        ):
+        marks = (session.transport.mark_in, 6.0, ruler.left), (session.transport.mark_out, -6.0, ruler.right)
+        for time, inwards, edge in marks:
             if time is None:
                 continue
             x = ruler.x(time)
             to.add_rect_filled((min(x, edge), top), (max(x, edge), bottom), dark)
-            colour = theme.packed(theme.WARM)
             to.path_clear()
-            for at_x, at_y in (
-                (x + 6 * way, top - 4),
-                (x, top - 4),
-                (x, bottom + 3),
-                (x + 6 * way, bottom + 3),
-            ):
-                to.path_line_to((at_x, at_y))
-            to.path_stroke(colour, thickness=2.5)
+            for at in ((x + inwards, top - 4), (x, top - 4), (x, bottom + 3), (x + inwards, bottom + 3)):
+                to.path_line_to(at)
+            to.path_stroke(theme.packed(theme.WARM), thickness=2.5)
 
     def _hover_text(
         self, session: Session, ruler: Ruler, to: imgui.ImDrawList, top: float, bottom: float
@@ -232,11 +215,3 @@ def _span(session: Session) -> tuple[float, float]:
     timeline = session.scene.timeline
     start = float(timeline.start)
     return start, max(float(timeline.time_of(timeline.frames - 1)), start)
-
-
-def _just_before(mark: float | None) -> float:
-    return math.inf if mark is None else mark - 1e-3
-
-
-def _just_after(mark: float | None) -> float:
-    return -math.inf if mark is None else mark + 1e-3

@@ -57,14 +57,13 @@ class Docks:
     def use(self, name: str) -> None:
         """Note that the user works with a panel: others are folded before it."""
         if name in self._sides and self._used[-1:] != [name]:
-            self._used = [*(one for one in self._used if one != name), name]
+            self._used = [*(used for used in self._used if used != name), name]
             self._arranged = ((), {})
 
     def arrange(self, requests: list[DockRequest], wide: float, top: float, high: float) -> dict[str, Dock]:
-        """Return the positions of panels by name, in a display `wide` points wide with `high` free points
-        from `top` on.
+        """Return the positions of panels by name; panels whose title has no room are left out.
 
-        Panels whose title has no room are left out.
+        wide: of the display. high: height that is free from `top` on.
         """
         key = (tuple(requests), wide, top, high)
         if self._arranged[0] == key:
@@ -76,19 +75,19 @@ class Docks:
         middle = max(MIN_MIDDLE_SHARE * wide, MIN_MIDDLE)
         both = room - middle >= 2 * MIN_COLUMN
         columns: dict[str, list[DockRequest]] = {"left": [], "right": []}
-        known = [name for name in self._sides if name in names]  # in the order in which they opened
-        for request in sorted(
-            requests, key=lambda one: known.index(one.name) if one.name in known else len(known)
-        ):
+        opened = list(self._sides)  # in this order; new ones come last
+        for request in sorted(requests, key=lambda request: [*opened, request.name].index(request.name)):
             if request.name not in self._sides:
                 self._sides[request.name] = _side(request, columns, high)
                 self._used.append(request.name)
             columns[self._sides[request.name] if both else "right"].append(request)
-        widths = {side: max((one.width for one in column), default=0.0) for side, column in columns.items()}
+        widths = {
+            side: max((panel.width for panel in column), default=0.0) for side, column in columns.items()
+        }
         most = max(room - middle, min(room, MIN_COLUMN))
         if sum(widths.values()) > most:
             half = max(most / 2, most - min(widths.values()))
-            widths = {side: min(own, half) for side, own in widths.items()}
+            widths = {side: min(width, half) for side, width in widths.items()}
         docks: dict[str, Dock] = {}
         for side, column in columns.items():
             left = EDGE if side == "left" else wide - EDGE - widths[side]
@@ -105,9 +104,9 @@ class Docks:
                 break
             if any(request.name == name for request in column):
                 folded.add(name)
-        heights = _share_height([TITLE if one.name in folded else one.least for one in column],
-                          [TITLE if one.name in folded else one.height for one in column],
-                          high - _gaps(column, folded))  # fmt: skip
+        least = [TITLE if request.name in folded else request.least for request in column]
+        liked = [TITLE if request.name in folded else request.height for request in column]
+        heights = _share_height(least, liked, high - _gaps(column, folded))
         docks, y = {}, top
         for request, height in zip(column, heights, strict=True):
             left_over = top + high - y
@@ -134,12 +133,12 @@ def _side(request: DockRequest, columns: dict[str, list[DockRequest]], high: flo
 
     All fit with the heights that they ask for if possible, else with their least heights.
     """
-    own, other = request.side, "right" if request.side == "left" else "left"
+    first, other = request.side, "right" if request.side == "left" else "left"
     for size in (_liked_height, _least_height):
-        for side in (own, other):
+        for side in (first, other):
             if size([*columns[side], request], set()) <= high:
                 return side
-    return min((own, other), key=lambda side: _least_height(columns[side], set()))
+    return min((first, other), key=lambda side: _least_height(columns[side], set()))
 
 
 def _liked_height(column: list[DockRequest], folded: set[str]) -> float:
@@ -156,8 +155,7 @@ def _gaps(column: list[DockRequest], folded: set[str]) -> float:
 
 
 def _share_height(least: list[float], most: list[float], room: float) -> list[float]:
-    """Return the heights from `least` to `most`; the room beyond the least is shared in proportion to the
-    difference."""
+    """Return heights from `least` to `most`; room beyond the least is shared in proportion to the rest."""
     least = [min(low, high) for low, high in zip(least, most, strict=True)]
     missing = sum(most) - sum(least)
     spare = min(max(room - sum(least), 0.0), missing)

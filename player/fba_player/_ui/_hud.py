@@ -117,13 +117,10 @@ def draw_notices(session: Session, display: tuple[float, float], above: float) -
         y -= size.y + 16
         corner = (left - 20, y), (left + size.x + 14, y + size.y + 16)
         to.add_rect_filled(*corner, theme.packed((0.105, 0.112, 0.124, 0.96), alpha), rounding=8.0)
-        to.add_rect_filled(
-            (left - 13, y + 8), (left - 10, y + size.y + 8), theme.packed(colour, alpha), rounding=1.5
-        )
-        to.add_text(
-            imgui.get_font(), imgui.get_font_size(), (left, y + 8), theme.packed(theme.TEXT, alpha),
-            notice.text, max(display[0] - 80, 60),
-        )  # fmt: skip
+        bar = (left - 13, y + 8), (left - 10, y + size.y + 8)
+        to.add_rect_filled(*bar, theme.packed(colour, alpha), rounding=1.5)
+        font, shade = (imgui.get_font(), imgui.get_font_size()), theme.packed(theme.TEXT, alpha)
+        to.add_text(*font, (left, y + 8), shade, notice.text, max(display[0] - 80, 60))
         y -= 8
 
 

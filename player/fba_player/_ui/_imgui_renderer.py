@@ -7,13 +7,13 @@ destroys textures as the library asks.
 from __future__ import annotations
 
 import ctypes
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from imgui_bundle import imgui
 
 from fba.arrays import Array, UInt8
+from fba_player.gl._resources import load_program
 
 VERTEX_BYTES = 20
 """Size of a Dear ImGui vertex: position and texture coordinates, two float32 each, and four bytes."""
@@ -35,11 +35,7 @@ class ImguiRenderer:
                 "version of imgui-bundle"
             )
         self._gl = context
-        folder = files("fba_player.gl") / "shaders"
-        self._program = context.program(
-            vertex_shader=(folder / "panels.vert").read_text(encoding="utf-8"),
-            fragment_shader=(folder / "panels.frag").read_text(encoding="utf-8"),
-        )
+        self._program = load_program(context, "panels")
         self._textures: dict[int, Any] = {}
         self._named_textures: dict[str, int] = {}
         self._vertices: Any = None
@@ -84,13 +80,10 @@ class ImguiRenderer:
     def set_picture(self, name: str, pixels: UInt8) -> imgui.ImTextureRef:
         """Upload a picture, uint8 (H, W, 4), for imgui to draw; it replaces the last of this name."""
         height, width = pixels.shape[:2]
-        made = self._gl.texture((width, height), 4, np.ascontiguousarray(pixels).tobytes())
-        made.filter = (self._gl.LINEAR, self._gl.LINEAR)
-        made.repeat_x = made.repeat_y = False
+        made = self._make_texture((width, height), np.ascontiguousarray(pixels).tobytes())
         if name in self._named_textures:
             self._textures.pop(self._named_textures[name]).release()
         self._named_textures[name] = made.glo
-        self._textures[made.glo] = made
         return imgui.ImTextureRef(made.glo)
 
     def close(self) -> None:
@@ -128,12 +121,10 @@ class ImguiRenderer:
                 x0, y0, x1, y1 = command.clip_rect
                 clip = (x0 - corner_x, y0 - corner_y, x1 - corner_x, y1 - corner_y)
                 first, number = before + command.idx_offset, command.get_tex_id()
-                if commands:
-                    last_clip, last_number, last_first, last_count = commands[-1]
-                    if last_clip == clip and last_number == number and last_first + last_count == first:
-                        commands[-1] = (clip, number, last_first, last_count + count_here)
-                        continue
-                commands.append((clip, number, first, count_here))
+                if commands and commands[-1][:2] == (clip, number) and sum(commands[-1][2:]) == first:
+                    commands[-1] = (clip, number, commands[-1][2], commands[-1][3] + count_here)
+                else:
+                    commands.append((clip, number, first, count_here))
             base += count
             before += length
         self._vertices.orphan()
@@ -143,14 +134,10 @@ class ImguiRenderer:
         return commands
 
     def _reserve(self, vertex_bytes: int, index_bytes: int) -> None:
-        if (
-            self._array is not None
-            and self._vertices.size >= vertex_bytes
-            and self._indices.size >= index_bytes
-        ):
-            return
-        for part in (self._array, self._vertices, self._indices):
-            if part is not None:
+        if self._array is not None:
+            if self._vertices.size >= vertex_bytes and self._indices.size >= index_bytes:
+                return
+            for part in (self._array, self._vertices, self._indices):
                 part.release()
         gl = self._gl
         self._vertices = gl.buffer(reserve=max(2 * vertex_bytes, 1 << 16), dynamic=True)
@@ -164,13 +151,17 @@ class ImguiRenderer:
             index_element_size=INDEX.itemsize,
         )
 
+    def _make_texture(self, size: tuple[int, int], data: bytes) -> Any:
+        made = self._gl.texture(size, 4, data)
+        made.filter = (self._gl.LINEAR, self._gl.LINEAR)
+        made.repeat_x = made.repeat_y = False
+        self._textures[made.glo] = made
+        return made
+
     def _update(self, texture: imgui.ImTextureData) -> None:
         status = imgui.ImTextureStatus
         if texture.status == status.want_create:
-            made = self._gl.texture((texture.width, texture.height), 4, texture.get_pixels_array().tobytes())
-            made.filter = (self._gl.LINEAR, self._gl.LINEAR)
-            made.repeat_x = made.repeat_y = False
-            self._textures[made.glo] = made
+            made = self._make_texture((texture.width, texture.height), texture.get_pixels_array().tobytes())
             texture.set_tex_id(made.glo)
             texture.set_status(status.ok)
         elif texture.status == status.want_updates:

@@ -8,9 +8,8 @@ from fba_player._ui._docks import EDGE, GAP, Dock, DockRequest, Docks, free_midd
 from fba_player._ui.panels.panel import Panel
 from fba_player.session._session import Session
 
-TOP = 56.0
+COLUMNS_TOP = 56.0
 """Top of the columns, below the buttons, in points."""
-
 
 _FLAGS = imgui.WindowFlags_
 FREE = int(_FLAGS.no_saved_settings | _FLAGS.no_collapse)
@@ -37,12 +36,12 @@ class PanelWindows:
     def draw(self, panels: list[Panel], session: Session, display: tuple[float, float], below: float) -> None:
         """Draw open panels. display: size in points. below: points that are used at the bottom."""
         wide, high = display
-        room = high - TOP - below - GAP
+        room = high - COLUMNS_TOP - below - GAP
         self.sides = (0.0, 0.0)
         if room < 60 or wide < 120:
             return
-        docked = [one for one in panels if one.side != "middle" and one.name not in self._moved]
-        docks = self._docks.arrange([self._request(one) for one in docked], wide, TOP, room)
+        docked = [panel for panel in panels if panel.side != "middle" and panel.name not in self._moved]
+        docks = self._docks.arrange([self._request(panel) for panel in docked], wide, COLUMNS_TOP, room)
         self.sides = free_middle(docks.values(), wide)
         for panel in panels:
             if panel in docked:
@@ -56,9 +55,7 @@ class PanelWindows:
         self._moved -= names
 
     def _request(self, panel: Panel) -> DockRequest:
-        height = panel.height
-        if panel.fitted:
-            height = self._needed.get(panel.name, height)
+        height = self._needed.get(panel.name, panel.height) if panel.fitted else panel.height
         return DockRequest(panel.name, panel.side, panel.width, height, panel.least)
 
     def _draw_docked(self, panel: Panel, session: Session, dock: Dock) -> None:
@@ -71,7 +68,7 @@ class PanelWindows:
         wide = min(panel.width, display[0] - 2 * EDGE)
         if panel.name not in self._moved:
             high = min(panel.height, room)
-            place = ((display[0] - wide) / 2, TOP + max(room - high, 0.0) / 2)
+            place = ((display[0] - wide) / 2, COLUMNS_TOP + max(room - high, 0.0) / 2)
             imgui.set_next_window_pos(place, imgui.Cond_.always)
             imgui.set_next_window_size((wide, high), imgui.Cond_.always)
             imgui.set_next_window_bg_alpha(COVERING_OPACITY)
@@ -88,9 +85,8 @@ class PanelWindows:
             panel.draw(session)
             if panel.fitted:
                 style = imgui.get_style()
-                self._needed[panel.name] = (
-                    imgui.get_cursor_pos_y() - style.item_spacing.y + style.window_padding.y
-                )
+                end = imgui.get_cursor_pos_y() - style.item_spacing.y
+                self._needed[panel.name] = end + style.window_padding.y
         self._handle_title(panel, folded=folded)
         imgui.end()
         return bool(stays_open)

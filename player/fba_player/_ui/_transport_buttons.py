@@ -14,7 +14,11 @@ from fba_player.session._actions import act
 from fba_player.session._keys import key_of
 from fba_player.session._session import Session
 
-MARGIN = 18.0
+SIDE_MARGIN = 18.0
+"""Points at the left and the right of the row."""
+BUTTON_SIZE = 30.0
+BUTTON_GAP = 4.0
+"""Width and height of a button, and the space between two, in points."""
 
 
 class Buttons:
@@ -30,8 +34,7 @@ class Buttons:
         room = wide >= 640
         if room:
             self._clock(session, y, full=wide >= 860)
-        centre = wide / 2
-        size, gap, big = 30.0, 4.0, 38.0
+        size, gap, big = BUTTON_SIZE, BUTTON_GAP, 38.0
         buttons = [
             ("first", icons.first, "first frame"),
             ("back", icons.back, "one frame back"),
@@ -39,21 +42,22 @@ class Buttons:
             ("on", icons.on, "one frame forward"),
             ("last", icons.last, "last frame"),
         ]
-        x = centre - (4 * size + big + 4 * gap) / 2
+        x = wide / 2 - (4 * size + big + 4 * gap) / 2
         for action, icon, text in buttons:
-            mine = big if action == "toggle" else size
-            imgui.set_cursor_screen_pos((x, y - (mine - size) / 2))
-            if icon_button(action, icon, mine, filled=action == "toggle"):
+            across = big if action == "toggle" else size
+            imgui.set_cursor_screen_pos((x, y - (across - size) / 2))
+            if icon_button(action, icon, across, filled=action == "toggle"):
                 act(session, action)
             tooltip(text, key_of(action))
-            x += mine + gap
+            x += across + gap
         if wide >= 460:
             x += 10
-            for action, icon, text, lit in (
+            marks = (
                 ("mark_in", icons.mark_in, "start of the loop here", transport.mark_in is not None),
                 ("mark_out", icons.mark_out, "end of the loop here", transport.mark_out is not None),
                 ("loop", icons.loop, "loop", transport.loop),
-            ):
+            )
+            for action, icon, text, lit in marks:
                 imgui.set_cursor_screen_pos((x, y))
                 colour = theme.WARM if lit and action != "loop" else None
                 if icon_button(action, icon, size, lit=lit, colour=colour):
@@ -65,7 +69,7 @@ class Buttons:
 
     def _clock(self, session: Session, y: float, *, full: bool) -> None:
         transport = session.transport
-        imgui.set_cursor_screen_pos((MARGIN, y + 3))
+        imgui.set_cursor_screen_pos((SIDE_MARGIN, y + 3))
         imgui.push_font(None, theme.LARGE)
         imgui.text_unformatted(transport.timecode())
         imgui.pop_font()
@@ -77,26 +81,23 @@ class Buttons:
 
     def _right(self, session: Session, wide: float, y: float, taken: float) -> None:
         transport = session.transport
-        size, gap = 30.0, 4.0
+        size, gap = BUTTON_SIZE, BUTTON_GAP
         buttons = [
             ("fullscreen", icons.full_screen, "full screen", False),
             ("record", icons.record, "record to an MP4 file", session.recording is not None),
             ("screenshot", icons.camera, "picture of the view", False),
-            (
-                "interpolate",
-                icons.smooth if transport.interpolate else icons.stepped,
-                "smooth between frames" if transport.interpolate else "frame by frame",
-                False,
-            ),
+            ("interpolate", icons.smooth, "smooth between frames", False)
+            if transport.interpolate
+            else ("interpolate", icons.stepped, "frame by frame", False),
         ]
         if session.audio is not None:
             quiet = session.audio.muted
             text = f"sound at {session.audio.volume:.0%}; turn the wheel here for more or less"
             if session.sound_offset:
-                way = "later" if session.sound_offset > 0 else "earlier"
-                text += f"\nbegins {abs(session.sound_offset):.2f} s {way}"
+                when = "later" if session.sound_offset > 0 else "earlier"
+                text += f"\nbegins {abs(session.sound_offset):.2f} s {when}"
             buttons.append(("mute", icons.muted if quiet else icons.sound, text, False))
-        x = wide - MARGIN + gap
+        x = wide - SIDE_MARGIN + gap
         for action, icon, text, lit in buttons:
             x -= size + gap
             if x < taken + 8:
@@ -118,16 +119,10 @@ class Buttons:
             imgui.text_colored(theme.FAINT if transport.speed == 1.0 else theme.ACCENT, text)
             text = ""
         self.slider = (x - slider - 12, x - 12)
-        imgui.set_cursor_screen_pos((x - slider - 12, y + 2))
+        imgui.set_cursor_screen_pos((self.slider[0], y + 2))
         imgui.set_next_item_width(slider)
-        changed, speed = imgui.slider_float(
-            "##speed",
-            transport.speed,
-            SPEEDS[0],
-            SPEEDS[-1],
-            text,
-            imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp,
-        )
+        flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp
+        changed, speed = imgui.slider_float("##speed", transport.speed, SPEEDS[0], SPEEDS[-1], text, flags)
         if changed:
             transport.set_speed(snap_speed(speed))
         if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):

@@ -42,8 +42,7 @@ class Gui:
         theme.apply_theme()
         self._renderer = ImguiRenderer(context)
         self.bar = Bar(self._renderer)
-        page = page_of(session)
-        self._page = page
+        self._page = page = page_of(session)
         self._plays = page is None or page.plays
         self.panels = make_panels(page.panel if page is not None else "")
         self._panel_windows = PanelWindows()
@@ -65,8 +64,7 @@ class Gui:
     def cursor(self) -> str:
         """The mouse cursor that imgui asks for, by its name, such as "arrow"."""
         imgui.set_current_context(self._context)
-        shape = imgui.get_mouse_cursor()
-        return imgui.MouseCursor_(shape).name or "arrow"
+        return imgui.MouseCursor_(imgui.get_mouse_cursor()).name or "arrow"
 
     def draw(self, delta: float) -> None:
         """Draw over the bound framebuffer, which has the session's size. delta: seconds since the last call.

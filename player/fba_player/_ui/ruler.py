@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-STEPS = (
+LABEL_STEPS = (
     *(0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30),
     *(60, 120, 300, 600, 900, 1800, 3600, 7200, 18000, 36000),
 )
@@ -36,7 +36,8 @@ class Ruler:
         """Return the least step in seconds for labels that are at least `apart` from each other."""
         wide = max(self.right - self.left, 1e-6)
         least = (self.high - self.low) * apart / wide
-        return next((step for step in STEPS if step >= least), max(math.ceil(least / 36000), 1) * 36000.0)
+        tens_of_hours = max(math.ceil(least / 36000), 1) * 36000.0
+        return next((step for step in LABEL_STEPS if step >= least), tens_of_hours)
 
     def ticks(self, step: float) -> list[float]:
         """Return the multiples of a step from low to high; at most 1001."""

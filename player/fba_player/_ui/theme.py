@@ -21,6 +21,7 @@ ALERT: Colour = (0.92, 0.36, 0.32, 1.0)
 GROUND: Colour = (0.086, 0.092, 0.102, 0.93)
 RAISED: Colour = (0.155, 0.165, 0.182, 1.0)
 HOVERED: Colour = (0.215, 0.23, 0.255, 1.0)
+HOLLOW: Colour = (0.0, 0.0, 0.0, 0.22)
 LINE: Colour = (1.0, 1.0, 1.0, 0.075)
 FEELINGS: dict[str, Colour] = {
     "joy": (0.98, 0.80, 0.25, 1.0), "sadness": (0.35, 0.55, 0.92, 1.0), "anger": (0.92, 0.32, 0.28, 1.0),

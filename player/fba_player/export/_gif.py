@@ -50,7 +50,6 @@ class Gif:
         self._colours, self._into, self._palette = self._graph("palettegen=stats_mode=full", 1)
 
     def write(self, pixels: UInt8, number: int) -> None:
-        """Add a picture, uint8 (H, W, 4), at number / rate seconds."""
         try:
             self._pictures.write(np.ascontiguousarray(pixels[..., :3]).data)
         except OSError as error:
@@ -59,7 +58,6 @@ class Gif:
         self._numbers.append(number)
 
     def finish(self, count: int) -> Path:
-        """Finish the film, count / rate seconds long; return its path."""
         self._into[0].push(None)
         palette = self._palette.pull()
         times = [round(number / self._rate * TICKS_PER_SECOND) for number in (*self._numbers, count)]
@@ -76,7 +74,6 @@ class Gif:
         return self._path
 
     def abort(self) -> None:
-        """Remove the unfinished file."""
         with contextlib.suppress(InterruptedError), self._cleanup:
             raise InterruptedError
 
@@ -110,8 +107,7 @@ class Gif:
         return frame
 
     def _graph(self, description: str, inputs: int) -> tuple[Any, list[Any], Any]:
-        """Return (graph, inputs, output) of a filter for pictures of the film's size; input 2 is a
-        palette."""
+        """Return (graph, inputs, output) of a filter for pictures of the film; input 2 is a palette."""
         name, _, options = description.partition("=")
         graph = self._av.filter.Graph()
         width, height = self._size

@@ -53,20 +53,17 @@ class Mp4:
         self._container: Any = None
         with contextlib.ExitStack() as undo:
             undo.callback(self.abort)
-            soundtrack: FilmedSound | None
-            if audio is None or not isinstance(audio, str | os.PathLike):
-                soundtrack = audio
-            else:
-                soundtrack = Soundtrack(audio, Fraction(audio_start))
-            if soundtrack is not None:
-                self._cleanup.callback(soundtrack.close)
+            if isinstance(audio, str | os.PathLike):
+                audio = Soundtrack(audio, Fraction(audio_start))
+            if audio is not None:
+                self._cleanup.callback(audio.close)
             name = _choose_encoder(self._av)
             temporary = self._cleanup.enter_context(atomic_path(path))
             with self._convert_errors():
                 options = {"movflags": "+faststart"}  # so that it plays while it is still loading
                 self._container = self._av.open(str(temporary), "w", format="mp4", options=options)
                 self._stream = _video_stream(self._container, name, rate, self._size)
-                self._audio = None if soundtrack is None else _AudioTrack(self._container, soundtrack)
+                self._audio = None if audio is None else _AudioTrack(self._container, audio)
             self._reformatter = self._av.video.reformatter.VideoReformatter()
             version, frames = av_version(self._av), self._av.VideoFrame
             # Versions before 14 have to copy the pixels.
@@ -81,7 +78,6 @@ class Mp4:
             undo.pop_all()
 
     def write(self, pixels: UInt8, number: int) -> None:
-        """Add a picture, uint8 (H, W, 4), at number / rate seconds."""
         width, height = self._size
         with self._convert_errors():
             shown = self._framed(pixels[:height, :width], format="rgba")
@@ -92,7 +88,6 @@ class Mp4:
                 self._audio.encode_until(number / self._rate)
 
     def finish(self, count: int) -> Path:
-        """Finish the film, count / rate seconds long; return its path."""
         with self._convert_errors():
             self._container.mux(self._stream.encode(None))
             if self._audio is not None:
@@ -105,12 +100,11 @@ class Mp4:
         return self._path
 
     def abort(self) -> None:
-        """Remove the unfinished file."""
         with contextlib.suppress(Exception):
             if self._container is not None:
                 self._container.close()
-        with contextlib.suppress(_Abandoned), self._cleanup:
-            raise _Abandoned
+        with contextlib.suppress(InterruptedError), self._cleanup:
+            raise InterruptedError  # so that the blocks remove their files
 
     @contextlib.contextmanager
     def _convert_errors(self) -> Any:
@@ -125,10 +119,6 @@ class Mp4:
             ) from error
 
 
-class _Abandoned(Exception):  # noqa: N818 - never seen outside
-    """Leaves the `with` blocks like an error, so that they remove their files."""
-
-
 class _AudioTrack:
     """The AAC track of a film, encoded as far as its pictures."""
 
@@ -141,13 +131,11 @@ class _AudioTrack:
         self._done = 0
 
     def encode_until(self, time: Fraction) -> None:
-        """Encode up to a time in seconds."""
         stop = round(time * self._soundtrack.rate)
         if stop <= self._done:
             return
         for frame in self._soundtrack.frames(stop - self._done):
-            frame.pts = self._done
-            frame.time_base = Fraction(1, self._soundtrack.rate)
+            frame.pts, frame.time_base = self._done, Fraction(1, self._soundtrack.rate)
             self._done += frame.samples
             self._container.mux(self._stream.encode(frame))
 
@@ -156,9 +144,9 @@ class _AudioTrack:
 
 
 def _choose_encoder(av: Any) -> str:
-    for name in ENCODERS:
-        if name in av.codec.codecs_available:
-            return name
+    name = next((name for name in ENCODERS if name in av.codec.codecs_available), None)
+    if name is not None:
+        return name
     raise DisplayError(
         "this build of PyAV has no H.264 encoder; install the wheel of av from the package index"
     )

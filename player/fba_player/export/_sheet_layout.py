@@ -9,7 +9,7 @@ TEXT = (232, 235, 240)
 FAINT = (158, 165, 175)
 PAPER = (34, 37, 43)
 """Colours of labels, of notes and between the pictures, sRGB."""
-SPACE = 4
+CELL_GAP = 4
 """Pixels between cells."""
 MIN_TILE = 16
 """Least width and height of a picture in pixels."""
@@ -28,7 +28,7 @@ class SheetLayout:
 
 
 def lay_out(
-    count: int, cell: tuple[int, int], columns: int | None = None, *, space: int = SPACE, top: int = 0
+    count: int, cell: tuple[int, int], columns: int | None = None, *, space: int = CELL_GAP, top: int = 0
 ) -> SheetLayout:
     """Return the layout of a sheet of equal cells, row by row.
 

@@ -17,6 +17,7 @@ from fba.arrays import Float64, UInt8
 from fba.capture.comparison import Stick
 from fba_player.export._sheet_layout import lay_out
 from fba_player.scene.scene import Scene
+from fba_player.view._geometry import transform
 from fba_player.view._view import View
 from fba_player.view.camera import Camera, Subject
 
@@ -24,6 +25,8 @@ TILE = (400, 480)
 """Width and height of one of the two pictures of a frame, in pixels."""
 SUPERSAMPLING = 2
 """Everything is painted this many times larger, and then reduced, which smooths edges."""
+SKIN_COLOUR = np.array([0.62, 0.34, 0.23])
+"""Linear colour of skin that has a texture: about its mean."""
 HIDDEN_KINDS = ("teeth", "tongue", "lash", "mouth")
 """Parts of a face that are too small to see, or behind the lips."""
 COLOURS = {"l": "#1f77b4", "r": "#d1495b", "": "#4a4e57"}
@@ -41,7 +44,7 @@ FILL_SHARE = 0.45
 YAW = 32.0
 PITCH = 7.0
 """Degrees by which the camera looks from the side, and from above."""
-MARGIN = 0.16
+FIGURE_MARGIN = 0.16
 """Metres around the figures."""
 
 
@@ -94,28 +97,22 @@ def _draw_pair(view: View, sight: Sight) -> list[Image.Image]:
     """Return the pictures of the source and of the result, by the same camera."""
     triangles, colours = _person(view)
     corners = np.concatenate([sight.stick.corners, triangles.reshape(-1, 3)])
-    camera = _camera(corners, triangles, sight)
-    size = (TILE[0] * SUPERSAMPLING, TILE[1] * SUPERSAMPLING)
-    result = []
-    for what in ("source", "result"):
-        picture = Image.new("RGB", size, PAPER)
-        draw = ImageDraw.Draw(picture)
-        _draw_floor(draw, camera, size, corners)
-        if what == "result":
-            _draw_triangles(draw, camera, size, triangles, colours)
-            _draw_lines(draw, camera, size, sight.stick, thin=True)
-        else:
-            _draw_stick(draw, camera, size, sight.stick)
-        result.append(picture.resize(TILE, Image.Resampling.LANCZOS))
-    return result
+    camera = _camera(corners, sight)
+    source, result = _Canvas(camera), _Canvas(camera)
+    source.draw_floor(corners)
+    source.draw_stick(sight.stick)
+    result.draw_floor(corners)
+    result.draw_triangles(triangles, colours)
+    result.draw_lines(sight.stick, thin=True)
+    return [canvas.picture.resize(TILE, Image.Resampling.LANCZOS) for canvas in (source, result)]
 
 
-def _camera(corners: Float64, triangles: Float64, sight: Sight) -> Camera:
+def _camera(corners: Float64, sight: Sight) -> Camera:
     """Return the camera that sees both figures, from ahead of the person and from one side."""
     low, high = np.percentile(corners, [0.5, 99.5], axis=0)
     low[1] = min(low[1], 0.0)
     centre = (low + high) / 2
-    half = (high - low) / 2 + MARGIN
+    half = (high - low) / 2 + FIGURE_MARGIN
     left = _left(sight.stick)
     facing = np.degrees(np.arctan2(-left[2], left[0]))
     across = float(np.hypot(half[0], half[2]))
@@ -127,25 +124,14 @@ def _camera(corners: Float64, triangles: Float64, sight: Sight) -> Camera:
 def _left(stick: Stick) -> Float64:
     """Return the horizontal vector from the middle of the right parts to that of the left parts."""
     sides = np.array(stick.sides)
-    places = stick.lines.mean(axis=1)
     if not (sides == "l").any() or not (sides == "r").any():
         return np.array([1.0, 0.0, 0.0])
     # the first bones of each side end at the hips: the clearest ends
     begin = [stick.lines[sides == side][0].mean(axis=0) for side in "lr"]
     vector = begin[0] - begin[1]
     if np.hypot(vector[0], vector[2]) < 1e-3:
-        vector = places[sides == "l"].mean(axis=0) - places[sides == "r"].mean(axis=0)
+        vector = stick.lines[sides == "l"].mean(axis=(0, 1)) - stick.lines[sides == "r"].mean(axis=(0, 1))
     return np.array([vector[0], 0.0, vector[2]])
-
-
-def _project(points: Float64, camera: Camera, size: tuple[int, int]) -> tuple[Float64, Float64]:
-    """Return pixels (..., 2) and distances (...) of points (..., 3)."""
-    matrix = camera.view_matrix()
-    seen = points @ matrix[:3, :3].T + matrix[:3, 3]
-    away = np.maximum(-seen[..., 2], 1e-3)
-    scale = size[1] / 2 / np.tan(np.radians(camera.field_of_view) / 2)
-    pixels = seen[..., :2] / away[..., None] * scale * [1.0, -1.0] + np.array(size) / 2
-    return pixels, away
 
 
 def _person(view: View) -> tuple[Float64, Float64]:
@@ -154,79 +140,78 @@ def _person(view: View) -> tuple[Float64, Float64]:
     for mesh in view.faces:
         if mesh.shape.kind in HIDDEN_KINDS or mesh.shape.across is not None:
             continue
-        points = mesh.positions.astype(np.float64) @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]
+        points = transform(mesh.positions.astype(np.float64), mesh.matrix)
         colour = mesh.shape.colours[:, :3].astype(np.float64)
         if mesh.shape.kind == "skin" and mesh.shape.picture is not None:
-            colour = colour * SKIN
+            colour = colour * SKIN_COLOUR
         triangles.append(points[mesh.shape.triangles])
         colours.append(colour[mesh.shape.triangles].mean(axis=1))
     return np.concatenate(triangles), np.concatenate(colours)
 
 
-SKIN = np.array([0.62, 0.34, 0.23])
-"""Linear colour of skin that has a texture: about its mean."""
+class _Canvas:
+    """A picture by a camera, painted larger than it will be."""
 
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+        size = (TILE[0] * SUPERSAMPLING, TILE[1] * SUPERSAMPLING)
+        self.picture = Image.new("RGB", size, PAPER)
+        self.draw = ImageDraw.Draw(self.picture)
 
-def _draw_triangles(
-    draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], triangles: Float64, colours: Float64
-) -> None:
-    """Paint triangles that face the camera, from back to front."""
-    pixels, away = _project(triangles, camera, size)
-    one, other = pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
-    seen = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    axes = camera.view_matrix()[:3, :3]
-    shade = FILL_SHARE + (1 - FILL_SHARE) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
-    shown = (np.clip(colours * shade[:, None], 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)
-    chosen = np.flatnonzero(seen)
-    for number in chosen[np.argsort(-away[chosen].mean(axis=1))].tolist():
-        draw.polygon(pixels[number].ravel().tolist(), fill=tuple(shown[number].tolist()))
+    def project(self, points: Float64) -> tuple[Float64, Float64]:
+        """Return pixels (..., 2) and distances (...) of points (..., 3)."""
+        seen = transform(points, self.camera.view_matrix())
+        away = np.maximum(-seen[..., 2], 1e-3)
+        scale = self.picture.height / 2 / np.tan(np.radians(self.camera.field_of_view) / 2)
+        pixels = seen[..., :2] / away[..., None] * scale * [1.0, -1.0] + np.array(self.picture.size) / 2
+        return pixels, away
 
+    def draw_triangles(self, triangles: Float64, colours: Float64) -> None:
+        """Paint triangles that face the camera, from back to front."""
+        pixels, away = self.project(triangles)
+        one, other = pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
+        seen = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        axes = self.camera.view_matrix()[:3, :3]
+        shade = FILL_SHARE + (1 - FILL_SHARE) * np.clip(normals @ axes.T @ LIGHT, 0.0, 1.0)
+        shown = (np.clip(colours * shade[:, None], 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)
+        chosen = np.flatnonzero(seen)
+        for number in chosen[np.argsort(-away[chosen].mean(axis=1))].tolist():
+            self.draw.polygon(pixels[number].ravel().tolist(), fill=tuple(shown[number].tolist()))
 
-def _draw_floor(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], corners: Float64) -> None:
-    """Paint the floor at height 0 as lines half a metre apart."""
-    middle = np.round(corners.mean(axis=0)[[0, 2]] * 2) / 2
-    for step in np.arange(-1.5, 1.51, 0.5):
-        for ends in (((step, -1.5), (step, 1.5)), ((-1.5, step), (1.5, step))):
-            points = np.array([[middle[0] + x, 0.0, middle[1] + z] for x, z in ends])
-            pixels, _ = _project(points, camera, size)
-            draw.line(pixels.ravel().tolist(), FLOOR, SUPERSAMPLING)
+    def draw_floor(self, corners: Float64) -> None:
+        """Paint the floor at height 0 as lines half a metre apart."""
+        middle = np.round(corners.mean(axis=0)[[0, 2]] * 2) / 2
+        for step in np.arange(-1.5, 1.51, 0.5):
+            for ends in (((step, -1.5), (step, 1.5)), ((-1.5, step), (1.5, step))):
+                points = np.array([[middle[0] + x, 0.0, middle[1] + z] for x, z in ends])
+                pixels, _ = self.project(points)
+                self.draw.line(pixels.ravel().tolist(), FLOOR, SUPERSAMPLING)
 
+    def draw_stick(self, stick: Stick) -> None:
+        """Paint a stick figure: areas of palms and soles, bones from back to front."""
+        for sole in stick.soles:
+            pixels, _ = self.project(sole)
+            self.draw.polygon(pixels.ravel().tolist(), fill=SOLE, outline=INK)
+        self.draw_lines(stick, thin=False)
+        eye = self.camera.eye
+        for palm in stick.palms:
+            pixels, _ = self.project(palm)
+            normal = np.cross(palm[1] - palm[0], palm[3] - palm[0])
+            colour = PALM if normal @ (eye - palm.mean(axis=0)) > 0 else BACK_OF_HAND
+            self.draw.polygon(pixels.ravel().tolist(), fill=colour, outline=INK)
 
-def _draw_stick(draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick) -> None:
-    """Paint a stick figure: areas of palms and soles, bones from back to front."""
-    for sole in stick.soles:
-        pixels, _ = _project(sole, camera, size)
-        draw.polygon(pixels.ravel().tolist(), fill=SOLE, outline=INK)
-    _draw_lines(draw, camera, size, stick, thin=False)
-    eye = camera.eye
-    for palm in stick.palms:
-        pixels, _ = _project(palm, camera, size)
-        normal = np.cross(palm[1] - palm[0], palm[3] - palm[0])
-        colour = PALM if normal @ (eye - palm.mean(axis=0)) > 0 else BACK_OF_HAND
-        draw.polygon(pixels.ravel().tolist(), fill=colour, outline=INK)
-
-
-def _draw_lines(
-    draw: ImageDraw.ImageDraw, camera: Camera, size: tuple[int, int], stick: Stick, *, thin: bool
-) -> None:
-    pixels, away = _project(stick.lines, camera, size)
-    width = SUPERSAMPLING if thin else 4 * SUPERSAMPLING
-    for number in np.argsort(-away.mean(axis=1)).tolist():
-        colour = COLOURS[stick.sides[number]]
-        draw.line(pixels[number].ravel().tolist(), colour, width, joint="curve")
-        if not thin:
-            x, y = pixels[number, 1].tolist()
-            draw.ellipse(
-                (
-                    x - 2.5 * SUPERSAMPLING,
-                    y - 2.5 * SUPERSAMPLING,
-                    x + 2.5 * SUPERSAMPLING,
-                    y + 2.5 * SUPERSAMPLING,
-                ),
-                colour,
-            )
+    def draw_lines(self, stick: Stick, *, thin: bool) -> None:
+        pixels, away = self.project(stick.lines)
+        width = SUPERSAMPLING if thin else 4 * SUPERSAMPLING
+        for number in np.argsort(-away.mean(axis=1)).tolist():
+            colour = COLOURS[stick.sides[number]]
+            self.draw.line(pixels[number].ravel().tolist(), colour, width, joint="curve")
+            if not thin:
+                x, y = pixels[number, 1].tolist()
+                reach = 2.5 * SUPERSAMPLING
+                self.draw.ellipse((x - reach, y - reach, x + reach, y + reach), colour)
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float32, Float64, UInt8
+from fba.arrays import Float32, UInt8
 from fba.face import FaceModel
 from fba.face.model import point_row
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
@@ -59,6 +60,8 @@ def contact_sheet(
     Raises ValueError for another name, pictures below 16x16 or a sheet that would be too large, DisplayError
     where there is no OpenGL.
     """
+    from PIL import Image
+
     if what not in SHEETS:
         raise ValueError(f"no contact sheet {what!r}; there are {', '.join(SHEETS)}")
     if tile is not None:
@@ -66,15 +69,13 @@ def contact_sheet(
     kinds = SHEETS[:3] if what == "all" else (what,)
     scene = Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model or FaceModel.default())
     sheets = [_sheet(scene, kind, tile or TILE[kind]) for kind in kinds]
-    widest = max(sheet.shape[1] for sheet in sheets)
-    joined = np.full((sum(sheet.shape[0] for sheet in sheets), widest, 3), PAPER, dtype=np.uint8)
+    widest = max(sheet.width for sheet in sheets)
+    joined = Image.new("RGB", (widest, sum(sheet.height for sheet in sheets)), PAPER)
     row = 0
     for sheet in sheets:
-        height, width = sheet.shape[:2]
-        left = (widest - width) // 2
-        joined[row : row + height, left : left + width] = sheet
-        row += height
-    return joined
+        joined.paste(sheet, ((widest - sheet.width) // 2, row))
+        row += sheet.height
+    return np.asarray(joined)
 
 
 def tiles(kind: str, scene: Scene) -> list[Tile]:
@@ -88,41 +89,41 @@ def tiles(kind: str, scene: Scene) -> list[Tile]:
         rows = zip(VISEMES[1:], definitions.visemes[1:], strict=True)
         return [Tile(name, f"viseme {n}", row, "cheeks") for n, (name, row) in enumerate(rows, start=1)]
     rows = zip(EXPRESSIONS[1:], definitions.expressions[1:], strict=True)
-    return [
-        Tile(name, f"expression {n}, {FULL_INTENSITY}", row) for n, (name, row) in enumerate(rows, start=1)
-    ]
+    note = f"expression {{}}, {FULL_INTENSITY}"
+    return [Tile(name, note.format(n), row) for n, (name, row) in enumerate(rows, start=1)]
 
 
 @cache
 def _fap_tiles() -> tuple[Tile, ...]:
     tiles = []
-    with (files(__package__) / "contact_sheet.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            number, value = int(row["fap"]), int(row["value"])
-            vector = np.zeros(FAP_COUNT, dtype=np.float32)
-            for pair in row["with"].split():
-                other, _, amount = pair.partition("=")
-                vector[int(other) - 1] = float(amount)
-            vector[number - 1] = value
-            vector.flags.writeable = False
-            label = f"{number} {faps()[number - 1].name}"
-            yaw, pitch = float(row["yaw"]), float(row["pitch"])
-            tiles.append(Tile(label, f"{value:+d}", vector, row["view"], yaw, pitch))
+    for row in _rows("contact_sheet.csv"):
+        number = int(row["fap"])
+        faps_shown = _faps(f"{row['with']} {number}={row['value']}")
+        label = f"{number} {faps()[number - 1].name}"
+        view = row["view"], float(row["yaw"]), float(row["pitch"])
+        tiles.append(Tile(label, f"{int(row['value']):+d}", faps_shown, *view))
     return tuple(tiles)
 
 
 @cache
 def _review_tiles() -> tuple[Tile, ...]:
-    tiles = []
-    with (files(__package__) / "review_sheet.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            vector = np.zeros(FAP_COUNT, dtype=np.float32)
-            for pair in row["faps"].split():
-                number, _, amount = pair.partition("=")
-                vector[int(number) - 1] = float(amount)
-            vector.flags.writeable = False
-            tiles.append(Tile(row["label"], "", vector, row["view"], float(row["yaw"])))
-    return tuple(tiles)
+    return tuple(
+        Tile(row["label"], "", _faps(row["faps"]), row["view"], float(row["yaw"]))
+        for row in _rows("review_sheet.csv")
+    )
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader((files(__package__) / name).read_text(encoding="utf-8").splitlines()))
+
+
+def _faps(text: str) -> Float32:
+    """Return FAPs, float32 (68,), read-only, of pairs NUMBER=VALUE; of two with one number, the last."""
+    vector = np.zeros(FAP_COUNT, dtype=np.float32)
+    for number, _, value in (pair.partition("=") for pair in text.split()):
+        vector[int(number) - 1] = float(value)
+    vector.flags.writeable = False
+    return vector
 
 
 def close_up(view: str, scene: Scene) -> Subject:
@@ -150,14 +151,15 @@ def close_up(view: str, scene: Scene) -> Subject:
         return Subject((x, y + 0.05 * face.half_height, z), 0.86 * face.half_height, 0.86 * face.half_width)
     names, offset, half_height, half_width = close_ups[view]
     points = scene.model.points
-    middle: Float64 = np.mean([points[point_row(name)] for name in names], axis=0) + offset
+    middle = np.mean([points[point_row(name)] for name in names], axis=0) + offset
     if not np.isfinite(middle).all():
         return face
-    x, y, z = (float(v) for v in middle)
+    x, y, z = middle.tolist()
     return Subject((x, y, z), half_height, half_width)
 
 
-def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> UInt8:
+def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> Any:
+    """Return a sheet as a `PIL.Image`."""
     from PIL import Image, ImageDraw
 
     shown = tiles(kind, scene)
@@ -169,10 +171,10 @@ def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> UInt8:
     draw = ImageDraw.Draw(sheet)
     font, small = label_font(letters), label_font(letters * 0.9)
     with Offscreen(scene, size, samples=4) as view:
-        for one, (x, y) in zip(shown, layout.corners, strict=True):
-            subject = close_up(one.view, scene)
-            view.camera = Camera(yaw=one.yaw, pitch=one.pitch).fit(subject, width / height)
-            sheet.paste(Image.fromarray(view.still(one.faps)[..., :3]), (x, y))
-            draw.text((x + 2, y + height + 2), shortened(draw, one.label, font, width), font=font, fill=TEXT)
-            draw.text((x + 2, y + height + 2 + line), one.note, font=small, fill=FAINT)
-    return np.asarray(sheet)
+        for tile, (x, y) in zip(shown, layout.corners, strict=True):
+            subject = close_up(tile.view, scene)
+            view.camera = Camera(yaw=tile.yaw, pitch=tile.pitch).fit(subject, width / height)
+            sheet.paste(Image.fromarray(view.still(tile.faps)[..., :3]), (x, y))
+            draw.text((x + 2, y + height + 2), shortened(draw, tile.label, font, width), font=font, fill=TEXT)
+            draw.text((x + 2, y + height + 2 + line), tile.note, font=small, fill=FAINT)
+    return sheet

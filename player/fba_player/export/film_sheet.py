@@ -45,13 +45,33 @@ def film_sheet(
     Raises ValueError for a count below 1, pictures below 16x16 or a sheet that would be too large, RangeError
     if no frame lies between start and end, DisplayError where there is no OpenGL.
     """
+    from PIL import Image, ImageDraw
+
     scene = as_scene(subject)
     size = tile or TILE
     if count < 1:
         raise ValueError(f"a contact sheet has at least one picture, not {count}")
     check_tile(size)
     frames = choose_frames(scene, count, start, end)
-    return _draw_sheet(scene, frames, size, camera, progress)
+    width, height = size
+    letters = max(min(width // 20, 16), 7)
+    layout = lay_out(len(frames), (width, height + round(letters * 1.6)))
+    sheet = Image.new("RGB", layout.size, PAPER)
+    draw = ImageDraw.Draw(sheet)
+    font = label_font(letters)
+    with Offscreen(scene, size, camera, samples=SAMPLES) as view:
+        for number, (frame, (x, y)) in enumerate(zip(frames, layout.corners, strict=True)):
+            time = scene.timeline.time_of(frame)
+            sheet.paste(Image.fromarray(view.frame(float(time))[..., :3]), (x, y))
+            code, where = timecode(float(time), scene.timeline.rate), f"frame {frame}"
+            below = y + height + 1
+            draw.text((x + 2, below), shortened(draw, code, font, width), font=font, fill=TEXT)
+            room = width - draw.textlength(code, font=font) - draw.textlength(where, font=font)
+            if room > 2 * letters:
+                draw.text((x + width - 2, below), where, font=font, fill=FAINT, anchor="ra")
+            if progress is not None:
+                progress(number + 1, len(frames))
+    return np.asarray(sheet)
 
 
 def choose_frames(scene: Showable, count: int, start: float | None, end: float | None) -> list[int]:
@@ -76,33 +96,3 @@ def choose_frames(scene: Showable, count: int, start: float | None, end: float |
     before = np.maximum(after - 1, inside[0])
     nearer = np.where(wanted - times[before] < times[after] - wanted, before, after)
     return [int(frame) for frame in np.unique(nearer)]
-
-
-def _draw_sheet(
-    scene: Showable,
-    frames: list[int],
-    size: tuple[int, int],
-    camera: Camera | str | None,
-    progress: Progress | None,
-) -> UInt8:
-    from PIL import Image, ImageDraw
-
-    width, height = size
-    letters = max(min(width // 20, 16), 7)
-    layout = lay_out(len(frames), (width, height + round(letters * 1.6)))
-    sheet = Image.new("RGB", layout.size, PAPER)
-    draw = ImageDraw.Draw(sheet)
-    font = label_font(letters)
-    with Offscreen(scene, size, camera, samples=SAMPLES) as view:
-        for number, (frame, (x, y)) in enumerate(zip(frames, layout.corners, strict=True)):
-            time = scene.timeline.time_of(frame)
-            sheet.paste(Image.fromarray(view.frame(float(time))[..., :3]), (x, y))
-            code, where = timecode(float(time), scene.timeline.rate), f"frame {frame}"
-            below = y + height + 1
-            draw.text((x + 2, below), shortened(draw, code, font, width), font=font, fill=TEXT)
-            room = width - draw.textlength(code, font=font) - draw.textlength(where, font=font)
-            if room > 2 * letters:
-                draw.text((x + width - 2, below), where, font=font, fill=FAINT, anchor="ra")
-            if progress is not None:
-                progress(number + 1, len(frames))
-    return np.asarray(sheet)

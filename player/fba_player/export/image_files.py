@@ -92,15 +92,14 @@ class Numbered:
                 f"{text}: write %0{numbers[0]}d, so that the numbers have zeros in front",
                 what="names of pictures",
             )
-        self._before, self._after = NUMBER.split(self.name)[0], NUMBER.split(self.name)[-1]
+        self._before, _, self._after = NUMBER.split(self.name)
 
     def path(self, number: int) -> Path:
         """Return the path of the picture of a frame, counted from 0."""
         return self.folder / f"{self._before}{number:0{self._width}d}{self._after}"
 
     def existing(self) -> list[int]:
-        """Return the numbers of the pictures that exist, ascending. Raises FormatError for an unreadable
-        folder."""
+        """Return the numbers of the pictures that exist, ascending; FormatError for an unreadable folder."""
         try:
             names = os.listdir(self.folder)
         except FileNotFoundError:
@@ -113,8 +112,7 @@ class Numbered:
 
 
 def is_sequence(path: PathLike) -> bool:
-    """Return whether a path stands for numbered pictures: it has a % in its last part, or ends with a
-    slash."""
+    """Return whether a path is of numbered pictures: a % in its last part, or a slash at its end."""
     text = os.fspath(path)
     return text.endswith(("/", os.sep)) or "%" in os.path.basename(text)
 
@@ -159,8 +157,7 @@ class Sequence:
 
     def write(self, pixels: UInt8, number: int) -> None:
         """Write a picture, uint8 (H, W, 4), as that of frame `number`."""
-        path = self._names.path(number)
-        write_picture(path, pixels, transparent=self._transparent)
+        write_picture(self._names.path(number), pixels, transparent=self._transparent)
 
     def finish(self, count: int) -> Path:
         """Return the folder of the pictures."""

@@ -27,7 +27,7 @@ ASPECT = 4 / 3
 """Width / height of the film."""
 MAX_FILM_SECONDS = Fraction(15)
 """Longest film: longer ones would make the page large, and the reader wait."""
-RATE = Fraction(30)
+MAX_PREVIEW_RATE = Fraction(30)
 """Most frames per second."""
 MAX_FILM_BYTES = 4 << 20
 """Size of a film above which the page gets a still picture instead."""
@@ -98,7 +98,7 @@ class Preview:
         from fba_player.export.render import film_rate, record
 
         rate = film_rate(scene.timeline.rate)
-        rate /= -(-rate // RATE)  # an integer fraction: frames are left out evenly
+        rate /= -(-rate // MAX_PREVIEW_RATE)  # an integer fraction: frames are left out evenly
         begin, end = scene.timeline.start, scene.timeline.end
         begin = begin if self._start is None else max(Fraction(self._start), begin)
         end = end if self._end is None else min(Fraction(self._end), end)
@@ -117,11 +117,8 @@ class Preview:
             )  # fmt: skip
             data = path.read_bytes()
         if len(data) > MAX_FILM_BYTES:
-            size = f"{len(data) / 2**20:.1f} MB"
-            text = (
-                f"A still picture only: the film would add {size} to the page; show less of it, or smaller."
-            )
-            return self._still(scene), text
+            added = f"the film would add {len(data) / 2**20:.1f} MB to the page"
+            return self._still(scene), f"A still picture only: {added}; show less of it, or smaller."
         width, height = self._size
         sound = "muted " if self._audio is None else ""
         return (
@@ -145,15 +142,12 @@ class Preview:
 def show_animations(shell: Any) -> None:
     """Make cells that end in an `Animation` show a film. shell: the InteractiveShell of IPython."""
     formatter = shell.display_formatter.formatters["text/html"]
-    formatter.for_type_by_name("fba.animation", "Animation", lambda one: Preview(one)._repr_html_())
+    formatter.for_type_by_name("fba.animation", "Animation", lambda shown: Preview(shown)._repr_html_())
 
 
 def describe(animation: Animation) -> str:
-    """Return one line about an animation: its name, frames, duration, rate, and whether it has a face and a
-    body."""
-    parts = [
-        name for name, track in (("face", animation.face), ("body", animation.body)) if track is not None
-    ]
+    """Return one line about an animation: its name, frames, duration, rate, and parts."""
+    parts = [name for name in ("face", "body") if getattr(animation, name) is not None]
     frames = len(animation)
     rate = f"{float(animation.rate):.3f}".rstrip("0").rstrip(".")
     name = f"{animation.name}: " if animation.name else ""

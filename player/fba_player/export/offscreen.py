@@ -17,7 +17,7 @@ from fba_player.gl.renderer import Renderer
 from fba_player.scene.scene import Scene
 from fba_player.view._view import View
 from fba_player.view.camera import Camera
-from fba_player.view.protocols import Showable
+from fba_player.view.protocols import Closing, Showable
 
 SAMPLES = 0
 """Samples per pixel; 0 is one, with edges smoothed afterwards."""
@@ -25,7 +25,7 @@ TRANSPARENT_SAMPLES = 4
 """Least samples per pixel if the background is transparent."""
 
 
-class Offscreen:
+class Offscreen(Closing):
     """Renders a scene into memory; needs no display.
 
     subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a `Camera`,
@@ -58,9 +58,7 @@ class Offscreen:
         self._multisampled: Target | None = None
         self._samples = samples
         try:
-            with (
-                self._gl
-            ):  # current only while it is used, so that other contexts of this thread keep working
+            with self._gl:  # current only while it is used: other contexts of this thread keep working
                 self._target = Target(self._gl, self.size, samples)
                 self._renderer = Renderer(self._gl)
         except Exception:
@@ -102,13 +100,12 @@ class Offscreen:
         return self._read(view, camera, self._target)
 
     def _draw_over_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
-        """Return both pictures, multisampled: the pass that smooths edges would miss dark ones before
-        black."""
+        """Return both pictures, multisampled: smoothing would miss dark edges before black."""
         with self._gl:
             if self._multisampled is None:
                 self._multisampled = Target(self._gl, self.size, max(self._samples, TRANSPARENT_SAMPLES))
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)]
-        return [self._read(one, camera, self._multisampled).copy() for one in views]
+        return [self._read(other, camera, self._multisampled).copy() for other in views]
 
     def _read(self, view: View, camera: Camera, target: Target) -> UInt8:
         assert self._renderer is not None
@@ -134,16 +131,9 @@ class Offscreen:
         self._gl.release()
         self._gl = None
 
-    def __enter__(self) -> Offscreen:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 def cut_out(black: UInt8, white: UInt8) -> UInt8:
-    """Return the foreground with alpha, uint8 (H, W, 4), from the same picture before black and before
-    white."""
+    """Return the foreground with alpha, uint8 (H, W, 4), of the same picture before black and white."""
     dark, light = (picture[..., :3].astype(np.float32) for picture in (black, white))
     opaque = np.clip(1 - (light - dark).mean(axis=2) / 255, 0.0, 1.0)
     foreground = np.empty_like(black)

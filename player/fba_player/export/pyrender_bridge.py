@@ -20,11 +20,12 @@ from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.choices import Axes
 from fba.errors import DisplayError
+from fba.rotations import unit
 from fba_player._mesh.primitives import sphere_mesh
 from fba_player.export.offscreen import follow_camera, looks_at_head
 from fba_player.gl._context import missing_libraries, missing_text
 from fba_player.scene.scene import Scene
-from fba_player.view._geometry import turn_partly, unit_rows
+from fba_player.view._geometry import transform, turn_partly
 from fba_player.view._view import Eye, FaceMesh, Mesh
 from fba_player.view.camera import Camera
 
@@ -129,22 +130,16 @@ def _face_primitive(pyrender: Any, face: FaceMesh) -> tuple[dict[str, Any], Any]
     if shape.picture is not None and shape.texcoords is not None:
         texture = pyrender.Texture(source=shape.picture.pixels, source_channels="RGBA")
         attributes["texcoord_0"] = np.stack([shape.texcoords[:, 0], 1 - shape.texcoords[:, 1]], axis=1)
-    material = pyrender.MetallicRoughnessMaterial(
-        baseColorTexture=texture,
-        metallicFactor=0.0,
-        roughnessFactor=_roughness(shape.colours),
-        alphaMode="BLEND" if shape.see_through else "OPAQUE",
-        doubleSided=not shape.closed,
-    )
-    return attributes, material
+    return attributes, _material(
+        pyrender, _roughness(shape.colours), baseColorTexture=texture,
+        alphaMode="BLEND" if shape.see_through else "OPAQUE", doubleSided=not shape.closed,
+    )  # fmt: skip
 
 
 def _mesh_primitive(pyrender: Any, mesh: Mesh) -> tuple[dict[str, Any], Any]:
     shape = mesh.shape
     attributes = _world_attributes(mesh.positions, mesh.normals, mesh.matrix, shape.triangles, shape.colours)
-    rough = _roughness(shape.colours)
-    material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=rough, doubleSided=True)
-    return attributes, material
+    return attributes, _material(pyrender, _roughness(shape.colours))
 
 
 def _eye_primitive(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
@@ -155,8 +150,12 @@ def _eye_primitive(pyrender: Any, ball: Eye) -> tuple[dict[str, Any], Any]:
     colours[front & (across < ball.iris), :3] = np.array(ball.tint) * IRIS_LIGHT
     colours[front & (across < ball.pupil), :3] = PUPIL
     attributes = _world_attributes(points, points, ball.matrix, triangles, colours)
-    material = pyrender.MetallicRoughnessMaterial(metallicFactor=0.0, roughnessFactor=WET, doubleSided=True)
-    return attributes, material
+    return attributes, _material(pyrender, WET)
+
+
+def _material(pyrender: Any, roughness: float, **more: Any) -> Any:
+    options = {"metallicFactor": 0.0, "roughnessFactor": roughness, "doubleSided": True, **more}
+    return pyrender.MetallicRoughnessMaterial(**options)
 
 
 def _world_attributes(
@@ -169,8 +168,8 @@ def _world_attributes(
     """Return the attributes of a pyrender primitive in world coordinates."""
     opaque = np.ones((len(colours), 1))
     return {
-        "positions": (positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32),
-        "normals": unit_rows(normals @ matrix[:3, :3].T).astype(np.float32),
+        "positions": transform(positions, matrix).astype(np.float32),
+        "normals": unit(normals @ matrix[:3, :3].T).astype(np.float32),
         "indices": np.ascontiguousarray(triangles, dtype=np.uint32),
         "color_0": np.hstack([colours[:, :3], opaque]).astype(np.float32),
     }
@@ -195,26 +194,23 @@ def _add_camera(pyrender: Any, scene: Any, camera: Camera, aspect: float) -> Non
 def _add_lights(pyrender: Any, scene: Any) -> None:
     lights = _studio()
     for name in ("KEY", "FILL", "RIM"):
-        colour = np.array(lights[name])
+        colour, direction = lights[name], lights[f"{name}_DIRECTION"]
         bright = float(colour.max())
         # Our surfaces reflect colour x light, those of pyrender the same divided by pi.
         light = pyrender.DirectionalLight(color=colour / bright, intensity=bright * math.pi * EXPOSURE)
-        scene.add(
-            light, name=f"{name.lower()} light", pose=_shining_from(np.array(lights[f"{name}_DIRECTION"]))
-        )
+        scene.add(light, name=f"{name.lower()} light", pose=_shining_from(direction))
 
 
 def _ambient() -> Float64:
     lights = _studio()
-    middle: Float64 = (np.array(lights["SKY"]) + np.array(lights["FLOOR"])) / 2 * EXPOSURE
-    return middle
+    return np.asarray((lights["SKY"] + lights["FLOOR"]) / 2 * EXPOSURE)
 
 
-def _studio() -> dict[str, tuple[float, float, float]]:
+def _studio() -> dict[str, Float64]:
     """Return the studio's lights as the shaders define them: linear colours and directions by name."""
     text = (files("fba_player.gl") / "shaders" / "lighting.glsl").read_text(encoding="utf-8")
     constants = re.findall(r"const vec3 ([A-Z_]+) = (?:normalize\()?vec3\(([^)]*)\)", text)
-    return {name: tuple(float(v) for v in values.split(",")) for name, values in constants}  # type: ignore[misc]
+    return {name: np.array(values.split(","), dtype=np.float64) for name, values in constants}
 
 
 def _shining_from(direction: Float64) -> Float64:

@@ -90,7 +90,8 @@ class Recorder:
     path: .mp4 (H.264, with sound) or .gif. size: width and height in pixels; MP4 needs even ones, and cuts
     the last column or row of odd ones. rate: frames per second. audio: a sound file (MP4 only), used from
     audio_start seconds in it (if negative, silence comes first) for the length of the film; or a
-    `fba_player.sound.soundtrack.FilmedSound`, which is closed with the film.
+    `fba_player.sound.soundtrack.FilmedSound`, which is closed with the film. sink: where pictures go in place
+    of a new file; then `path` is for messages.
 
     Use it as a context manager: it closes at the end, and aborts if an exception leaves the block. The file
     appears under its name when it is complete.
@@ -107,33 +108,21 @@ class Recorder:
         rate: Fraction | int | str = 30,
         audio: PathLike | FilmedSound | None = None,
         audio_start: float | Fraction = 0,
+        sink: Sink | None = None,
     ) -> None:
-        width, height = (int(v) for v in size)
-        self.path = Path(path)
-        self.rate = exact_rate(rate)
-        self._start(_open_sink(self.path, (width, height), self.rate, audio, audio_start), (width, height))
-
-    @classmethod
-    def into(cls, sink: Sink, path: PathLike, size: tuple[int, int], rate: Fraction) -> Recorder:
-        """Return a recorder that writes to a sink which is open already. path: for messages."""
-        self = cls.__new__(cls)
-        self.path, self.rate = Path(path), rate
-        self._start(sink, size)
-        return self
-
-    def _start(self, sink: Sink, size: tuple[int, int]) -> None:
-        self.size = size
+        self.path, self.rate = Path(path), exact_rate(rate)
+        self.size = width, height = (int(size[0]), int(size[1]))
+        self._sink = sink or _open_sink(self.path, self.size, self.rate, audio, audio_start)
         self.dropped = 0
         """Number of pictures that were left out because the encoder was busy."""
         self._last = -1
-        self._sink = sink
         self._error: BaseException | None = None
         self._result: Path | None = None
         self._closed = self._stop = False
         self._free: queue.SimpleQueue[UInt8] = queue.SimpleQueue()
         self._full: queue.SimpleQueue[tuple[UInt8, int] | None] = queue.SimpleQueue()
-        for _ in range(min(max(MAX_WAITING_BYTES // (size[0] * size[1] * 4 or 1), 2), MAX_WAITING_PICTURES)):
-            self._free.put(np.zeros((size[1], size[0], 4), dtype=np.uint8))
+        for _ in range(min(max(MAX_WAITING_BYTES // (width * height * 4 or 1), 2), MAX_WAITING_PICTURES)):
+            self._free.put(np.zeros((height, width, 4), dtype=np.uint8))
         self._thread = threading.Thread(target=self._encode, name="fba recorder", daemon=True)
         self._thread.start()
         atexit.register(self.abort)  # no temporary file stays if `close` is forgotten

@@ -80,8 +80,13 @@ def render(
     or a time outside of the animation, ValueError for an impossible size or an unknown preset, FormatError if
     a file cannot be written or read.
     """
-    _check_name(path)
-    target = Path(path)
+    target, suffix = Path(path), _suffix(path)
+    if suffix not in (*FILMS, *PICTURES) and not is_sequence(path):
+        raise UnsupportedError(
+            f"{path}: pictures are written as .png or .jpg, films as .mp4 or .gif, numbered pictures as "
+            f"folder/%05d.png, but not {suffix or 'a bare name'}",
+            what=f"rendering to {suffix or 'no suffix'}",
+        )
     scene = as_scene(animation)
     if is_film(path):
         if frame is not None or time is not None:
@@ -133,13 +138,12 @@ def record(
     shown = as_scene(scene)
     if not math.isfinite(audio_offset):
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
-    suffix = os.path.splitext(os.fspath(path))[1].lower()
     numbered = is_sequence(path)
     transparent = transparent or _is_transparent(shown)
     if transparent and not numbered:
         raise UnsupportedError(
             f"{path}: a film cannot be transparent; write numbered pictures, frames/%05d.png",
-            what=f"transparency in {suffix}",
+            what=f"transparency in {_suffix(path)}",
         )
     if numbered and audio is not None:
         raise ValueError("pictures have no sound; leave the audio out, or write an .mp4")
@@ -152,7 +156,7 @@ def record(
         # Opened before the first picture is drawn, so that a missing encoder or folder is reported at once.
         if numbered:
             sink = Sequence(Numbered(path), count, transparent=transparent, replace=replace)
-            recorder = Recorder.into(sink, path, (width, height), film)
+            recorder = Recorder(path, (width, height), rate=film, sink=sink)
         else:
             into = first - shown.timeline.start - Fraction(audio_offset).limit_denominator(10**6)
             recorder = Recorder(path, (width, height), rate=film, audio=audio, audio_start=into)
@@ -171,9 +175,8 @@ def record(
 
 def picture_size(size: tuple[int, int] | None, path: PathLike) -> tuple[int, int]:
     """Return the width and height of a picture or film of that name. size: as given by the user, or None."""
-    suffix = os.path.splitext(os.fspath(path))[1].lower()
-    width, height = size or (GIF_SIZE if suffix == ".gif" else SIZE)
-    return (width // 2 * 2, height // 2 * 2) if suffix == ".mp4" else (width, height)
+    width, height = size or (GIF_SIZE if _suffix(path) == ".gif" else SIZE)
+    return (width // 2 * 2, height // 2 * 2) if _suffix(path) == ".mp4" else (width, height)
 
 
 def as_scene(subject: Animation | Showable) -> Showable:
@@ -188,21 +191,15 @@ def film_rate(rate: Fraction, path: PathLike | None = None) -> Fraction:
     """
     low, high = SMOOTH_RATES
     rate = rate * math.ceil(low / rate) if rate < low else rate / math.ceil(rate / high)
-    if path is not None and os.fspath(path).lower().endswith(".gif"):
+    if path is not None and _suffix(path) == ".gif":
         from fba_player.export._gif import gif_rate
 
         return gif_rate(rate)
     return rate
 
 
-def _check_name(path: PathLike) -> None:
-    suffix = os.path.splitext(os.fspath(path))[1].lower()
-    if suffix not in (*FILMS, *PICTURES) and not is_sequence(path):
-        raise UnsupportedError(
-            f"{path}: pictures are written as .png or .jpg, films as .mp4 or .gif, numbered pictures as "
-            f"folder/%05d.png, but not {suffix or 'a bare name'}",
-            what=f"rendering to {suffix or 'no suffix'}",
-        )
+def _suffix(path: PathLike) -> str:
+    return os.path.splitext(os.fspath(path))[1].lower()
 
 
 def _is_transparent(scene: Showable) -> bool:
@@ -213,14 +210,12 @@ def _is_transparent(scene: Showable) -> bool:
 @contextmanager
 def _background(scene: Any, *, clear: bool) -> Iterator[None]:
     """Switch the scene's background to transparent for the block, if `clear` is True."""
-    before = scene.switches["background"] if clear else None
-    if clear:
-        scene.show("background", "transparent")
+    before = scene.switches["background"]
+    scene.show("background", "transparent" if clear else before)
     try:
         yield
     finally:
-        if clear:
-            scene.show("background", before)
+        scene.show("background", before)
 
 
 def _picture_time(scene: Showable, frame: int | None, time: float | None) -> float:

@@ -49,9 +49,8 @@ def draw_side_by_side(
     """
     suffix = os.path.splitext(os.fspath(path))[1].lower()
     if suffix not in FILMS + PICTURES:
-        raise UnsupportedError(
-            f"{path}: write {', '.join(FILMS + PICTURES)}", what=f"{suffix or 'no'} suffix"
-        )
+        text = f"{path}: write {', '.join(FILMS + PICTURES)}"
+        raise UnsupportedError(text, what=f"{suffix or 'no'} suffix")
     if not performances:
         raise ValueError("there is no performance to draw")
     scenes = {name: as_scene(performance) for name, performance in performances.items()}
@@ -59,12 +58,9 @@ def draw_side_by_side(
     check_tile(size)
     with ExitStack() as stack:
         grid = _Grid(list(scenes), size)
-        views = [
-            stack.enter_context(
-                Offscreen(scene, size, camera, samples=PICTURE_SAMPLES if suffix in PICTURES else 0)
-            )
-            for scene in scenes.values()
-        ]
+        samples = PICTURE_SAMPLES if suffix in PICTURES else 0
+        drawn = (Offscreen(scene, size, camera, samples=samples) for scene in scenes.values())
+        views = [stack.enter_context(view) for view in drawn]
         if suffix in PICTURES:
             middles = [scene.timeline.time_of(scene.timeline.frames // 2) for scene in scenes.values()]
             pixels = grid.draw([v.frame(float(time)) for v, time in zip(views, middles, strict=True)])

@@ -21,13 +21,14 @@ from fba_player.gl._labels import (
 from fba_player.gl._resources import (
     RecentlyUsed,
     load_program,
+    make_buffer,
     make_texture,
     matrix_bytes,
     set_uniform,
     write_buffer,
 )
-from fba_player.view._geometry import world_normals, world_positions
-from fba_player.view._view import Dots, Extras, FaceMesh, FaceShape, Grid, Legend, Lines
+from fba_player.view._geometry import project, world_normals, world_positions
+from fba_player.view._view import Dots, Extras, FaceMesh, Grid, Legend, Lines
 from fba_player.view.camera import Camera
 
 REFERENCE_HEIGHT = 720
@@ -42,24 +43,13 @@ NAME_SIZE = 13
 MIN_NAME_SIZE = 10
 """Pixels."""
 MIN_LEGEND_SCALE = 0.65
-MARGIN = 14
+LEGEND_MARGIN = 14
+"""Pixels from the legend to the edges of a picture 720 high."""
 CACHED_LABELS = 16
 """Number of label textures that are cached."""
 CACHED_SHELLS = 48
 """Number of shells whose triangles are cached; the least recently used goes first."""
 PROGRAMS = ("line", "dot", "shell", "grid", "label")
-
-
-def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
-    """Return the pixels (N, 2) from the upper left and depths (N,), 0..1, of points (N, 3); NaN behind the
-    camera.
-
-    matrix: (4, 4), world to clip space.
-    """
-    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
-    clip[clip[:, 3] < 1e-6] = np.nan
-    flat = clip[:, :3] / clip[:, 3:]
-    return (flat[:, :2] * (0.5, -0.5) + 0.5) * size, flat[:, 2] * 0.5 + 0.5
 
 
 def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> float:
@@ -68,14 +58,6 @@ def _pixels_per_metre(dots: Dots, camera: Camera, size: tuple[int, int]) -> floa
         return 0.0
     away = float(np.linalg.norm(dots.positions.mean(axis=0) - camera.eye))
     return size[1] / (2 * max(away, 1e-6) * math.tan(math.radians(camera.field_of_view) / 2))
-
-
-def _lift(points: Float64, eye: Float64, lift: float) -> Float64:
-    """Return the points (N, 3) moved by `lift` metres towards the eye."""
-    towards = eye - points
-    length = np.linalg.norm(towards, axis=1, keepdims=True)
-    lifted: Float64 = points + towards * (lift / np.maximum(length, 1e-6))
-    return lifted
 
 
 class ExtrasRenderer:
@@ -94,9 +76,9 @@ class ExtrasRenderer:
         """Draw into the bound framebuffer, over a picture from that camera and with its depths."""
         if not self._programs:
             self._programs = {name: load_program(self._gl, f"extra_{name}") for name in PROGRAMS}
-            self._square = self._gl.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4").tobytes())
+            self._square = make_buffer(self._gl, [-1, -1, 1, -1, -1, 1, 1, 1])
         gl = self._gl
-        matrix = camera.projection_matrix(size[0] / max(size[1], 1)) @ camera.view_matrix()
+        matrix = camera.clip_matrix(size)
         for program in self._programs.values():
             set_uniform(program, "camera", matrix_bytes(matrix))
             set_uniform(program, "eye", tuple(float(v) for v in camera.eye))
@@ -126,7 +108,6 @@ class ExtrasRenderer:
         gl.enable_only(gl.DEPTH_TEST)
 
     def close(self) -> None:
-        """Free all OpenGL objects."""
         self._labels.clear()
         self._triangles.clear()
         for part in (*self._buffers.values(), *self._programs.values()):
@@ -143,9 +124,8 @@ class ExtrasRenderer:
         if buffer is None or buffer.size < data.nbytes:
             if buffer is not None:
                 buffer.release()
-            buffer = self._buffers[name] = self._gl.buffer(
-                reserve=max(data.nbytes, 64) * 5 // 4, dynamic=True
-            )
+            size = max(data.nbytes, 64) * 5 // 4
+            buffer = self._buffers[name] = self._gl.buffer(reserve=size, dynamic=True)
         write_buffer(buffer, data)
         return buffer
 
@@ -160,7 +140,7 @@ class ExtrasRenderer:
             at = np.concatenate([world_positions(mesh), world_normals(mesh)], axis=1).astype("f4")
             vertices = self._fill_buffer(f"shell {number}", at)
             content = [(vertices, "3f 3f", "in_position", "in_normal")]
-            triangles = self._triangles.get(mesh.shape, partial(self._upload_triangles, mesh.shape))
+            triangles = self._triangles.get(mesh.shape, partial(make_buffer, gl, mesh.shape.triangles, "i4"))
             arrays.append(gl.vertex_array(self._programs["shell"], content, index_buffer=triangles))
         # Depths first, so that only the nearest surface shows.
         gl.blend_func = gl.ZERO, gl.ONE
@@ -173,9 +153,6 @@ class ExtrasRenderer:
         gl.depth_func = "<"
         for array in arrays:
             array.release()
-
-    def _upload_triangles(self, shape: FaceShape) -> Any:
-        return self._gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes())
 
     def _draw_grid(self, grid: Grid) -> None:
         program = self._programs["grid"]
@@ -227,9 +204,11 @@ class ExtrasRenderer:
         pixels = max(round(NAME_SIZE * scale), MIN_NAME_SIZE)
         texture, boxes = self._label((dots.names, pixels), lambda: names_picture(dots.names, pixels))
         at = dots.positions.astype(np.float64)
-        facing = np.einsum("ij,ij->i", dots.facing, eye - at) >= 0
         pixel, depth = project(at, matrix, size)
-        nearer = project(_lift(at, eye, dots.lift), matrix, size)[1]
+        towards = eye - at
+        facing = np.einsum("ij,ij->i", dots.facing, towards) >= 0
+        away = np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-6)
+        nearer = project(at + towards * (dots.lift / away), matrix, size)[1]
         inside = facing & np.isfinite(depth) & ((pixel >= 0) & (pixel < size)).all(axis=1)
         if not 0 < inside.sum() <= MAX_NAMES:
             return
@@ -238,20 +217,19 @@ class ExtrasRenderer:
         pixel[~inside] = np.nan
         shown, corners = place_names(pixel, boxes[:, 2:], dots.radius * scale, size)
         if len(shown):
-            own = boxes[shown].astype(np.float64)
+            parts = boxes[shown].astype(np.float64)
             texture_size = np.array(texture.size * 2, dtype=np.float64)
-            self._draw_labels(texture, np.concatenate([corners, own[:, 2:], own / texture_size], axis=1))
+            self._draw_labels(texture, np.concatenate([corners, parts[:, 2:], parts / texture_size], axis=1))
 
     def _draw_legend(self, legend: Legend, size: tuple[int, int], scale: float) -> None:
         texture, _ = self._label((legend, scale), lambda: (legend_picture(legend, scale), None))
         wide, high = texture.size
-        edge = round(MARGIN * scale)
+        edge = round(LEGEND_MARGIN * scale)
         if wide + 2 * edge <= size[0]:
             self._draw_labels(texture, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
 
     def _depths_of(self, size: tuple[int, int]) -> Float32:
-        """Return float32 (H, W): depths of the picture, 0..1, bottom row first; read once for each
-        picture."""
+        """Return float32 (H, W): depths of the picture, 0..1, bottom row first; read once a picture."""
         if self._depths is not None:
             return self._depths
         gl, source, parts = self._gl, self._gl.fbo, []

@@ -10,14 +10,15 @@ import numpy as np
 from fba.arrays import Float32, Float64, Floating
 from fba.compiled import is_compiled
 from fba_player.gl._silhouette import Outliner
-from fba_player.view._geometry import turn_partly
+from fba_player.view._geometry import transform, turn_partly
 from fba_player.view._view import FaceMesh, View
 
-MARGIN = 0.03
+MARGIN_SHARE = 0.03
 """Margin on every side, as a share of a rectangle's size."""
 MIN_DEPTH = 1e-3
 """Metres in front of the camera; a corner that is nearer gives the whole picture."""
-ROW = 64
+VERTICES_A_ROW = 64
+"""Vertices in a row of numbers: NumPy finds extremes of long rows faster than of short ones."""
 MAX_STILL_SWAY = 0.3
 """Vertices that turn with the head by less than this get a box of their own: shoulders are wide and low."""
 
@@ -52,12 +53,11 @@ def find_steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Out
 
 
 def bounding_rectangles(view: View, matrix: Float64, size: tuple[int, int]) -> list[Rectangle]:
-    """Return the rectangles (left, bottom, width, height), in pixels, that together contain all that is
-    drawn.
+    """Return the rectangles in pixels that together contain all that is drawn; none lies within another.
 
-    matrix: (4, 4), world to clip space. None of them lies within another.
+    matrix: (4, 4), world to clip space.
     """
-    boxes = [_corners(mesh.positions) @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3] for mesh in view.meshes]
+    boxes = [transform(_corners(mesh.positions), mesh.matrix) for mesh in view.meshes]
     boxes += [box for face in view.faces for box in _face_boxes(face)]
     for round_ in (view.capsules, view.marks):
         if len(round_):
@@ -74,13 +74,13 @@ def bounding_rectangles(view: View, matrix: Float64, size: tuple[int, int]) -> l
 
 def _face_boxes(face: FaceMesh) -> list[Float64]:
     if not np.any(face.turn):
-        return [_corners(face.positions) @ face.matrix[:3, :3].T + face.matrix[:3, 3]]
+        return [transform(_corners(face.positions), face.matrix)]
     still = face.shape.sway < MAX_STILL_SWAY
     boxes = []
     for box in (_corners(face.positions[still]), _corners(face.positions[~still])):
         turned = turn_partly(box, np.ones(len(box)), face.turn, face.centre)
         both = np.concatenate([box, turned])  # the neck bends between them
-        boxes.append(both @ face.matrix[:3, :3].T + face.matrix[:3, 3])
+        boxes.append(transform(both, face.matrix))
     return boxes
 
 
@@ -91,7 +91,7 @@ def _rectangle(points: Float64, matrix: Float64, size: tuple[int, int]) -> Recta
         return (0, 0, *size)
     flat = clip[:, :2] / clip[:, 3:]
     low, high = flat.min(axis=0), flat.max(axis=0)
-    grown = MARGIN * (high - low) + 4 / np.array(size)
+    grown = MARGIN_SHARE * (high - low) + 4 / np.array(size)
     pixels = (np.stack([low - grown, high + grown]) * 0.5 + 0.5) * size
     left, bottom = np.clip(np.floor(pixels[0]), 0, size).astype(int)
     right, top = np.clip(np.ceil(pixels[1]), 0, size).astype(int)
@@ -103,20 +103,19 @@ def _area(rectangle: Rectangle) -> int:
 
 
 def _within(one: Rectangle, other: Rectangle) -> bool:
-    return (
-        one[0] >= other[0]
-        and one[1] >= other[1]
-        and one[0] + one[2] <= other[0] + other[2]
-        and one[1] + one[3] <= other[1] + other[3]
-    )
+    begins = one[0] >= other[0] and one[1] >= other[1]
+    return begins and one[0] + one[2] <= other[0] + other[2] and one[1] + one[3] <= other[1] + other[3]
 
 
 def _corners(positions: Float32) -> Float64:
     if not len(positions):
         return np.zeros((0, 3))
-    # NumPy finds extremes of long rows faster than of short ones.
-    inner = len(positions) // ROW * ROW
-    rows = positions[:inner].reshape(-1, 3 * ROW) if inner else positions[:1].repeat(ROW, 0).reshape(1, -1)
+    inner = len(positions) // VERTICES_A_ROW * VERTICES_A_ROW
+    rows = (
+        positions[:inner].reshape(-1, 3 * VERTICES_A_ROW)
+        if inner
+        else positions[:1].repeat(VERTICES_A_ROW, 0).reshape(1, -1)
+    )
     low = np.concatenate([rows.min(axis=0).reshape(-1, 3), positions[inner:]])
     high = np.concatenate([rows.max(axis=0).reshape(-1, 3), positions[inner:]])
     return _box(low.min(axis=0), high.max(axis=0))

@@ -59,8 +59,7 @@ def offscreen_context() -> Any:
 
 
 def missing_libraries(names: Iterable[str] = OPENGL) -> list[str]:
-    """Return those of the named libraries that cannot be loaded; on systems other than Linux, an empty
-    list."""
+    """Return those of the named libraries that cannot be loaded; none on systems other than Linux."""
     if not sys.platform.startswith("linux"):
         return []
     missing = []

@@ -15,7 +15,7 @@ from fba.arrays import UInt8
 from fba.errors import DisplayError
 from fba_player.gl._antialias_region import Steps
 from fba_player.gl._context import import_moderngl
-from fba_player.gl._resources import load_program, write_buffer
+from fba_player.gl._resources import load_program, make_buffer, write_buffer
 
 
 class Target:
@@ -59,7 +59,7 @@ class Target:
             colour.filter = (gl.LINEAR, gl.LINEAR)
             colour.repeat_x = colour.repeat_y = False
             self._program = self._own(load_program(gl, "smooth"))
-            corners = self._own(gl.buffer(np.array([-1, -1, 3, -1, -1, 3], dtype="f4").tobytes()))
+            corners = self._own(make_buffer(gl, [-1, -1, 3, -1, -1, 3]))
             self._pass = self._own(gl.vertex_array(self._program, [(corners, "2f", "in_corner")]))
         self._colour = colour
         self._drawn = self._own(gl.framebuffer([colour], depth))
@@ -70,17 +70,13 @@ class Target:
         return part
 
     def begin(self) -> None:
-        """Bind it for drawing."""
         self._drawn.use()
 
     def finish(self, into: Any = None, within: Steps | None = None) -> Any:
-        """Return the framebuffer that holds the finished picture: one of its own, or, with samples = 0,
-        `into`.
+        """Return the framebuffer with the finished picture: its own, or, with samples = 0, `into`.
 
-        within: the regions to be smoothed; everywhere by default.
-
-        `into` may be a window's framebuffer: its size is taken to be that of this target, as moderngl does
-        not notice that a window was resized.
+        within: the regions to be smoothed; everywhere by default. `into` may be a window's framebuffer, whose
+        size is taken to be that of this target, as moderngl does not notice that a window was resized.
         """
         if self._pass is None:
             self._gl.copy_framebuffer(self._result, self._drawn)
@@ -99,19 +95,16 @@ class Target:
             self._pass.render()
         self._gl.scissor = None
         if within is not None and len(within.bands) and everything not in rectangles:
-            self._smooth_bands(within)
+            data = np.ascontiguousarray(within.bands, dtype="f4")
+            if self._bands is None or self._bands.size < data.nbytes:
+                self._bands = self._own(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
+                content = [(self._bands, "2f", "in_corner")]
+                self._along = self._own(self._gl.vertex_array(self._program, content))
+            write_buffer(self._bands, data)
+            self._along.render(vertices=len(data))
         return result
 
-    def _smooth_bands(self, within: Steps) -> None:
-        data = np.ascontiguousarray(within.bands, dtype="f4")
-        if self._bands is None or self._bands.size < data.nbytes:
-            self._bands = self._own(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
-            self._along = self._own(self._gl.vertex_array(self._program, [(self._bands, "2f", "in_corner")]))
-        write_buffer(self._bands, data)
-        self._along.render(vertices=len(data))
-
     def close(self) -> None:
-        """Free all OpenGL objects."""
         for part in reversed(self._parts):
             part.release()
         self._parts.clear()

@@ -59,8 +59,10 @@ class CastShadow:
 
 
 class Points(NamedTuple):
-    """Points on triangles. corners: int32 (N, 3), shares: float32 (N, 3), weights of the corners; area:
-    float32 (N,), m²."""
+    """Points on triangles.
+
+    corners: int32 (N, 3). shares: float32 (N, 3), weights of the corners. area: float32 (N,), m².
+    """
 
     corners: Int32
     shares: Float32
@@ -83,10 +85,8 @@ class ShadowCaster:
         if not is_compiled():
             return None
         ahead = 0.9 / KEY_DIRECTION[1]  # shadows fall away from the key light
-        low = [
-            (np.floor((position - ahead * direction) / CELL) - CELLS / 2) * CELL
-            for position, direction in zip(middle, KEY_DIRECTION[::2], strict=True)
-        ]
+        corner = (np.floor((middle - ahead * np.array(KEY_DIRECTION[::2])) / CELL) - CELLS / 2) * CELL
+        low = (float(corner[0]), float(corner[1]))
         count = 0
         for mesh in meshes:
             points = self._points_of(mesh.shape)
@@ -95,7 +95,7 @@ class ShadowCaster:
             if count + len(points.area) > len(self._rows):
                 more = np.empty((2 * len(points.area), 6), dtype=np.float32)
                 self._rows = np.concatenate([self._rows, more])
-            count = _place_points(mesh.positions, mesh.matrix, points, low[0], low[1], self._rows, count)
+            count = _place_points(mesh.positions, mesh.matrix, points, low, self._rows, count)
         left, bottom, right, top = _cast_shadow(self._rows[:count], _rays(), self._darkness)
         if right <= left:
             return None
@@ -112,8 +112,7 @@ class ShadowCaster:
 
 
 def _spread(shape: FaceShape) -> Points | None:
-    """Return the points spread over a shape's surface in its rest pose; None for a shape that casts no
-    shadow."""
+    """Return points spread over a shape's surface at rest; None for a shape that casts no shadow."""
     if shape.coarser is None or shape.kind in INNER_KINDS:
         return None
     coarse = shape.coarser.triangles_within(SAMPLING_ERROR)
@@ -159,13 +158,7 @@ def _rays() -> Float64:
 
 @compiled
 def _place_points(
-    positions: Float32,
-    matrix: Float64,
-    points: Points,
-    low_x: float,
-    low_z: float,
-    rows: Float32,
-    count: int,
+    positions: Float32, matrix: Float64, points: Points, low: tuple[float, float], rows: Float32, count: int
 ) -> int:
     """Write points from row `count` on: column, height (m), row; normal, as long as the area in cells.
 
@@ -191,9 +184,9 @@ def _place_points(
             continue
         a, b, c = shares[i, 0], shares[i, 1], shares[i, 2]
         piece = area[i] / (CELL * CELL) / length
-        rows[count, 0] = (a * p[0, 0] + b * p[1, 0] + c * p[2, 0] - low_x) / CELL - 0.5
+        rows[count, 0] = (a * p[0, 0] + b * p[1, 0] + c * p[2, 0] - low[0]) / CELL - 0.5
         rows[count, 1] = max(a * p[0, 1] + b * p[1, 1] + c * p[2, 1], 0.0)
-        rows[count, 2] = (a * p[0, 2] + b * p[1, 2] + c * p[2, 2] - low_z) / CELL - 0.5
+        rows[count, 2] = (a * p[0, 2] + b * p[1, 2] + c * p[2, 2] - low[1]) / CELL - 0.5
         rows[count, 3], rows[count, 4], rows[count, 5] = piece * nx, piece * ny, piece * nz
         count += 1
     return count
@@ -241,23 +234,11 @@ def _cover(rows: Float32, rx: float, ry: float, rz: float, layer: Float32) -> No
         # Spread over three cells each way by a quadratic spline, as the points are not quite even.
         middle, centre = int(column + half), int(row + half)
         fx, fy = column - np.float32(middle), row - np.float32(centre)
-        one, two, three = (
-            half * (half - fx) * (half - fx),
-            quarters - fx * fx,
-            half * (half + fx) * (half + fx),
-        )
-        down = amount * (half * (half - fy) * (half - fy))
-        layer[centre - 1, middle - 1] += down * one
-        layer[centre - 1, middle] += down * two
-        layer[centre - 1, middle + 1] += down * three
-        down = amount * (quarters - fy * fy)
-        layer[centre, middle - 1] += down * one
-        layer[centre, middle] += down * two
-        layer[centre, middle + 1] += down * three
-        down = amount * (half * (half + fy) * (half + fy))
-        layer[centre + 1, middle - 1] += down * one
-        layer[centre + 1, middle] += down * two
-        layer[centre + 1, middle + 1] += down * three
+        across = half * (half - fx) * (half - fx), quarters - fx * fx, half * (half + fx) * (half + fx)
+        down = half * (half - fy) * (half - fy), quarters - fy * fy, half * (half + fy) * (half + fy)
+        for j in range(3):
+            for k in range(3):
+                layer[centre - 1 + j, middle - 1 + k] += amount * down[j] * across[k]
 
 
 @compiled

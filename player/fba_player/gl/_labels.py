@@ -6,6 +6,7 @@ import numpy as np
 
 from fba.arrays import Float64, Int64, Intp, UInt8
 from fba_player.view._font import label_font
+from fba_player.view._geometry import overlap
 from fba_player.view._view import Legend
 
 TEXT = (240, 242, 245, 255)
@@ -17,12 +18,12 @@ MIN_LEGEND_HEIGHT = 240
 """Pixels: lower pictures have no legend."""
 MAX_NAMES = 45
 """If more points are in view, none is named."""
-GAP = 2.0
+NAME_GAP = 2.0
+"""Pixels between a dot and its name."""
 
 
 def legend_picture(legend: Legend, scale: float) -> UInt8:
-    """Return uint8 (H, W, 4): a colour bar with numbers below and a title above. scale: 1 in a picture 720
-    high."""
+    """Return uint8 (H, W, 4): a colour bar with a title and numbers. scale: 1 in a picture 720 high."""
     from PIL import Image, ImageDraw
 
     title, small = label_font(round(17 * scale)), label_font(round(14 * scale))
@@ -43,13 +44,15 @@ def legend_picture(legend: Legend, scale: float) -> UInt8:
         draw.line((pad + column, top, pad + column, top + bar), fill=(*fill, 255))
     for share, anchor in ((0.0, "la"), (0.5, "ma"), (1.0, "ra")):
         below = (pad + share * (columns - 1), top + bar + 4 * scale)
-        draw.text(below, _number(legend.most * share), font=small, fill=TEXT, anchor=anchor)
+        draw.text(below, f"{legend.most * share:.3g}", font=small, fill=TEXT, anchor=anchor)
     return np.asarray(picture)
 
 
 def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
-    """Return uint8 (H, W, 4): all names below each other; and int64 (N, 4): left, top, width and height of
-    each."""
+    """Return all names below each other, uint8 (H, W, 4), and their boxes, int64 (N, 4).
+
+    A box is left, top, width and height.
+    """
     from PIL import Image, ImageDraw
 
     font = label_font(pixels)
@@ -66,8 +69,7 @@ def names_picture(names: tuple[str, ...], pixels: int) -> tuple[UInt8, Int64]:
 
 
 def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int]) -> tuple[Intp, Float64]:
-    """Return the indices (M,) of the names for which there is room, and their upper left corners (M, 2),
-    pixels.
+    """Return the indices (M,) of names for which there is room, and their upper left corners (M, 2), pixels.
 
     dots: (N, 2), pixels from the upper left, NaN for hidden ones. sizes: (N, 2), of the names. Each name is
     beside its dot, or above its point if radius is 0, and none overlaps another. Nothing is drawn if the
@@ -76,32 +78,20 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
     inside = np.isfinite(dots).all(axis=1) & ((dots >= 0) & (dots < size)).all(axis=1)
     if inside.sum() > MAX_NAMES:
         return np.zeros(0, dtype=np.intp), np.zeros((0, 2))
-    reach = radius + GAP
+    reach = radius + NAME_GAP
     taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in dots[inside]]
     shown, corners = [], []
     for number in np.flatnonzero(inside):
         (x, y), (wide, high) = dots[number], sizes[number]
         above = [(min(max(x - wide / 2, 0.0), size[0] - wide), y - high)] if radius == 0 else []
-        for left, top in (
-            *above,
-            (x + reach, y - high / 2),
-            (x - reach - wide, y - high / 2),
-            (x - wide / 2, y - reach - high),
-            (x - wide / 2, y + reach),
-        ):
+        beside = [(x + reach, y - high / 2), (x - reach - wide, y - high / 2)]
+        beyond = [(x - wide / 2, y - reach - high), (x - wide / 2, y + reach)]
+        for left, top in (*above, *beside, *beyond):
             box = (left, top, left + wide, top + high)
             within = left >= 0 and top >= 0 and box[2] <= size[0] and box[3] <= size[1]
-            if within and not any(_meet(box, other) for other in taken):
+            if within and not any(overlap(box, other) > 0 for other in taken):
                 taken.append(box)
                 shown.append(number)
                 corners.append((round(left), round(top)))
                 break
     return np.array(shown, dtype=np.intp), np.array(corners, dtype=np.float64).reshape(-1, 2)
-
-
-def _meet(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
-
-
-def _number(value: float) -> str:
-    return "0" if value == 0 else f"{value:.3g}"

@@ -22,8 +22,7 @@ SAMPLED_VERTICES = 24
 
 @dataclass(eq=False)
 class _Level:
-    """A coarser shape, its vertices as rows (N,) of the full one, and the last light: of the full shape and
-    of these rows."""
+    """A coarser shape, its vertices as rows (N,) of the full one, and the last light of all and of these."""
 
     shape: FaceShape
     rows: Intp
@@ -37,8 +36,7 @@ class Details:
         self._levels: WeakKeyDictionary[FaceShape, dict[int, _Level | None]] = WeakKeyDictionary()
 
     def choose(self, meshes: list[FaceMesh], eye: npt.ArrayLike, pixel: float) -> list[FaceMesh]:
-        """Return the meshes at the levels of detail for a camera at `eye` (3,), with pixels of size `pixel`
-        at a distance of 1."""
+        """Return the meshes at levels of detail for a camera at `eye` (3,). pixel: its size at distance 1."""
         position = np.asarray(eye, dtype=np.float64)
         return [self._choose(mesh, position, pixel) for mesh in meshes]
 
@@ -72,23 +70,24 @@ class Details:
 
 def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
     rows, corners = np.unique(triangles, return_inverse=True)
+    texcoords, places = (
+        None if array is None else np.ascontiguousarray(array[rows])
+        for array in (shape.texcoords, shape.wrinkle_places)
+    )
     coarser = replace(
         shape,
         triangles=np.ascontiguousarray(corners.reshape(-1, 3), dtype=np.int32),
         colours=np.ascontiguousarray(shape.colours[rows]),
         sway=np.ascontiguousarray(shape.sway[rows]),
-        texcoords=None if shape.texcoords is None else np.ascontiguousarray(shape.texcoords[rows]),
-        wrinkle_places=None
-        if shape.wrinkle_places is None
-        else np.ascontiguousarray(shape.wrinkle_places[rows]),
+        texcoords=texcoords,
+        wrinkle_places=places,
         coarser=None,
     )
     return _Level(coarser, rows.astype(np.intp))
 
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
-    """Return the distance from an eye (3,) to the nearest of some sampled vertices, in the mesh's own
-    unit."""
+    """Return the distance from an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
     sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED_VERTICES, 1)]
     return float(_nearest(sample, mesh.matrix, eye))
 

@@ -14,6 +14,7 @@ from fba_player.gl._lod import distance, share_memory
 from fba_player.gl._resources import (
     RecentlyUsed,
     load_program,
+    make_buffer,
     make_texture,
     matrix_bytes,
     set_uniform,
@@ -25,8 +26,7 @@ from fba_player.view._view import FaceMesh, FaceShape
 CACHED_SHAPES = 64
 """Number of parts whose buffers are cached; the least recently used goes first."""
 CORE_OPACITY = 0.9
-"""Pixels of blended parts with at least this opacity are drawn first, as opaque; then the others are
-blended."""
+"""Pixels of blended parts with at least this opacity are drawn first, as opaque, then the others."""
 MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
 MIN_RELIEF = 0.25
@@ -46,8 +46,7 @@ class FaceRenderer:
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
-        """Set the camera: its position (3,), the matrix (4, 4) from world to clip space, and the size of a
-        pixel at a distance of 1."""
+        """Set the camera: its position (3,), the matrix (4, 4) to clip space, a pixel's size."""
         before = self._camera
         self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
         if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
@@ -61,7 +60,9 @@ class FaceRenderer:
             if not mesh.shape.see_through:
                 self._draw(mesh)
         transparent = [mesh for mesh in meshes if mesh.shape.see_through]
-        self._draw_cores(transparent)
+        for mesh in transparent:  # pixels that are nearly opaque hide what is behind them, in any order
+            if mesh.shape.alpha == "blend":
+                self._draw(mesh, core=True)
         if transparent:
             gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
             gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
@@ -71,15 +72,7 @@ class FaceRenderer:
             gl.fbo.depth_mask = True
             gl.enable_only(gl.DEPTH_TEST)
 
-    def _draw_cores(self, meshes: list[FaceMesh]) -> None:
-        """Draw the nearly opaque pixels of blended parts, which then hide what is behind them, in any
-        order."""
-        for mesh in meshes:
-            if mesh.shape.alpha == "blend":
-                self._draw(mesh, core=True)
-
     def close(self) -> None:
-        """Free all OpenGL objects."""
         self._shapes.clear()
         for part in (*self._reliefs.values(), *self._wrinkles.values(), *self._programs.values()):
             part.release()
@@ -126,7 +119,11 @@ class FaceRenderer:
         if not len(shape.triangles):  # a part so small that no level of detail is left of it from afar
             return
         parts = self._shapes.get(shape, lambda: self._upload(mesh))
-        _upload_vertices(mesh, parts)
+        write_buffer(parts["positions"], mesh.positions)
+        write_buffer(parts["normals"], mesh.normals)
+        if parts["lit"] is None or not share_memory(parts["lit"], mesh.light):
+            parts["lit"] = mesh.light
+            write_buffer(parts["light"], mesh.light)
         away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
         wide = self._camera[2] * away
         picture = parts["pictures"].choose(wide)
@@ -168,24 +165,22 @@ class FaceRenderer:
         gl, shape, count = self._gl, mesh.shape, len(mesh.positions)
         texcoords = shape.texcoords if shape.texcoords is not None else np.zeros((count, 2))
         still = np.concatenate([shape.colours, texcoords, shape.sway[:, None]], axis=1)
-        parts: dict[str, Any] = {
+        texel = 0.0
+        if shape.wrinkle_places is not None:
+            texel = texture_breadth(*_in_map(shape, mesh.positions)) / TEXELS
+        return {
             "positions": gl.buffer(reserve=max(count, 1) * 12, dynamic=True),
             "normals": gl.buffer(reserve=max(count, 1) * 12, dynamic=True),
             "light": gl.buffer(reserve=max(count, 1) * 16, dynamic=True),
-            "still": gl.buffer(np.ascontiguousarray(still, dtype="f4").tobytes()),
-            "triangles": gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes()),
+            "still": make_buffer(gl, still),
+            "triangles": make_buffer(gl, shape.triangles, "i4"),
+            "across": None if shape.across is None else make_buffer(gl, shape.across),
+            "wrinkles": None if shape.wrinkle_places is None else make_buffer(gl, shape.wrinkle_places),
+            "wrinkle_texel": texel,
+            "arrays": {},
+            "pictures": Pictures(gl, shape, mesh.positions),
+            "lit": None,
         }
-        parts["across"] = None
-        if shape.across is not None:
-            parts["across"] = gl.buffer(np.ascontiguousarray(shape.across, dtype="f4").tobytes())
-        parts["wrinkles"], parts["wrinkle_texel"] = None, 0.0
-        if shape.wrinkle_places is not None:
-            parts["wrinkles"] = gl.buffer(np.ascontiguousarray(shape.wrinkle_places, dtype="f4").tobytes())
-            parts["wrinkle_texel"] = texture_breadth(*_in_map(shape, mesh.positions)) / TEXELS
-        parts["arrays"] = {}
-        parts["pictures"] = Pictures(gl, shape, mesh.positions)
-        parts["lit"] = None
-        return parts
 
     def _wrinkle_map(self, mesh: FaceMesh, parts: dict[str, Any], wide: float) -> Any:
         """Return the map of wrinkles for pixels of this width (m), or None where there is nothing to see."""
@@ -195,15 +190,9 @@ class FaceRenderer:
         if halvings not in self._wrinkles:
             from PIL import Image
 
-            pixels = wrinkle_map()
-            smaller = np.stack(
-                [
-                    np.asarray(Image.fromarray(channel).reduce(2**halvings))
-                    for channel in np.moveaxis(pixels, 2, 0)
-                ],
-                axis=2,
-            )
-            texture = make_texture(self._gl, smaller)
+            channels = map(Image.fromarray, np.moveaxis(wrinkle_map(), 2, 0))
+            smaller = [np.asarray(channel.reduce(2**halvings)) for channel in channels]
+            texture = make_texture(self._gl, np.stack(smaller, axis=2))
             texture.repeat_x = texture.repeat_y = False
             self._wrinkles[halvings] = texture
         return self._wrinkles[halvings]
@@ -224,15 +213,6 @@ class FaceRenderer:
         return self._reliefs[halvings]
 
 
-def _upload_vertices(mesh: FaceMesh, parts: dict[str, Any]) -> None:
-    """Write positions and normals into a part's buffers, and its light unless that is there already."""
-    write_buffer(parts["positions"], mesh.positions)
-    write_buffer(parts["normals"], mesh.normals)
-    if parts["lit"] is None or not share_memory(parts["lit"], mesh.light):
-        parts["lit"] = mesh.light
-        write_buffer(parts["light"], mesh.light)
-
-
 def _set_shape(program: Any, shape: FaceShape) -> None:
     """Set the uniforms for a shape, unless the program has them already."""
     if program.extra.get("shape") is shape:
@@ -249,7 +229,7 @@ def _set_pose(program: Any, mesh: FaceMesh) -> None:
     """Set the uniforms for a mesh's position and turn, unless the program has them already."""
     pose = (mesh.matrix, mesh.turn, mesh.centre)
     before = program.extra.get("pose")
-    if before is not None and all(one is other for one, other in zip(pose, before, strict=True)):
+    if before is not None and all(now is then for now, then in zip(pose, before, strict=True)):
         return
     program.extra["pose"] = pose
     set_uniform(program, "world", matrix_bytes(mesh.matrix))
@@ -258,7 +238,6 @@ def _set_pose(program: Any, mesh: FaceMesh) -> None:
 
 
 def _set_wrinkles(program: Any, mesh: FaceMesh) -> None:
-    """Set the uniforms for a mesh's wrinkles."""
     assert mesh.wrinkles is not None
     left, right = (tuple(float(strength) for strength in side) for side in mesh.wrinkles)
     set_uniform(program, "wrinkles_left", left)

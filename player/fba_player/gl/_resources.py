@@ -7,6 +7,7 @@ from importlib.resources import files
 from typing import Any, Generic, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from fba.arrays import Array, UInt8
 
@@ -14,8 +15,7 @@ Value = TypeVar("Value")
 
 
 def load_program(context: Any, name: str, *defined: str) -> Any:
-    """Return the program of shaders/NAME.vert and NAME.frag on a moderngl context. defined: names to
-    define for the preprocessor."""
+    """Return the program of shaders/NAME.vert and NAME.frag. defined: names for the preprocessor."""
     folder = files(__package__) / "shaders"
     lighting = (folder / "lighting.glsl").read_text(encoding="utf-8")
     sources = {
@@ -51,9 +51,13 @@ def matrix_bytes(matrix: Array) -> bytes:
     return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()
 
 
+def make_buffer(context: Any, array: npt.ArrayLike, kind: str = "f4") -> Any:
+    """Return a buffer with the content of an array, as float32 or another `kind`."""
+    return context.buffer(np.ascontiguousarray(array, dtype=kind).tobytes())
+
+
 def write_buffer(buffer: Any, array: Array) -> None:
-    """Write an array as float32 into a buffer, orphaned first, so that nothing waits for draws in
-    progress."""
+    """Write an array as float32 into a buffer, orphaned first, so that nothing waits for draws."""
     buffer.orphan()
     buffer.write(np.ascontiguousarray(array, dtype="f4"))
 
@@ -62,8 +66,7 @@ def make_texture(context: Any, pixels: UInt8, *, smooth: bool = True) -> Any:
     """Return a texture of pixels, uint8 (H, W, components). smooth: whether to interpolate between them."""
     height, width, components = pixels.shape
     texture = context.texture((width, height), components, np.ascontiguousarray(pixels).tobytes())
-    nearest_or_linear = context.LINEAR if smooth else context.NEAREST
-    texture.filter = (nearest_or_linear, nearest_or_linear)
+    texture.filter = (context.LINEAR,) * 2 if smooth else (context.NEAREST,) * 2
     return texture
 
 
@@ -84,7 +87,6 @@ class RecentlyUsed(Generic[Value]):
         return value
 
     def clear(self) -> None:
-        """Release all values."""
         for value in self._values.values():
             self._release(value)
         self._values.clear()

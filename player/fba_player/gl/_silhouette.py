@@ -5,41 +5,35 @@ Software OpenGL takes as long to search a whole picture for edges as to draw a f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from fba.arrays import Float32, Float64, Int8, Int32, UInt8
+from fba.arrays import Float32, Float64, Int32, UInt8
 from fba.compiled import compiled
 from fba_player.gl._resources import RecentlyUsed
 from fba_player.view._view import FaceMesh
 
 TILE = 8
 """Size (pixels) of the tiles that are smoothed if an outline runs through them."""
-MARGIN = 1.5
+OUTLINE_MARGIN = 1.5
 """Pixels on each side of an outline that may need smoothing."""
 CACHED_SHAPES = 64
 """Number of shapes whose edges are cached."""
 
 
-@dataclass(eq=False)
-class Edges:
-    """The edges of a triangulation, and work space for outlines.
+class Edges(NamedTuple):
+    """The edges of a triangulation.
 
-    triangles: (F, 3). ends: (E, 2), vertices. sides: (E, 2), the triangles on both sides, -1 for none. seen:
-    (V, 3), projected vertices. facing: (F,), which way triangles face. sway: that of the shape, and a copy.
+    triangles: (F, 3). ends: (E, 2), vertices. sides: (E, 2), the triangles on both sides, -1 for none.
     """
 
     triangles: Int32
     ends: Int32
     sides: Int32
-    facing: Int8
-    seen: Float32
-    sway: tuple[Float32, Float32] | None = None
 
 
 def find_edges(triangles: Int32) -> Edges:
-    """Return the edges of triangles (F, 3)."""
     corners = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     owner = np.repeat(np.arange(len(triangles), dtype=np.int32), 3)
     ordered = np.sort(corners, axis=1)
@@ -52,14 +46,9 @@ def find_edges(triangles: Int32) -> Edges:
     sides[:, 0] = owner[start]
     uses = np.diff(np.append(start, len(ordered)))
     sides[uses == 2, 1] = owner[start[uses == 2] + 1]
-    return Edges(
-        # A copy: read-only arrays are another type, for which the loops would be compiled again.
-        np.array(triangles, dtype=np.int32, order="C"),
-        np.ascontiguousarray(ordered[start], dtype=np.int32),
-        sides,
-        np.empty(len(triangles), dtype=np.int8),
-        np.empty((0, 3), dtype=np.float32),
-    )
+    ends = np.ascontiguousarray(ordered[start], dtype=np.int32)
+    # A copy: read-only arrays are another type, for which the loops would be compiled again.
+    return Edges(np.array(triangles, dtype=np.int32, order="C"), ends, sides)
 
 
 class Outliner:
@@ -90,73 +79,37 @@ class Outliner:
                 f"{len(mesh.positions)} positions for a shape of {len(mesh.shape.sway)} vertices"
             )
         edges = self._edges.get(mesh.shape, lambda: find_edges(mesh.shape.triangles))
-        clip = np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64)
-        if edges.sway is None or edges.sway[0] is not mesh.shape.sway:
-            edges.sway = (mesh.shape.sway, np.array(mesh.shape.sway, dtype=np.float32, order="C"))
-        if len(edges.seen) != len(mesh.positions):
-            edges.seen = np.empty((len(mesh.positions), 3), dtype=np.float32)
-        _add(
+        _mark(
             np.ascontiguousarray(mesh.positions, dtype=np.float32),
-            edges.sway[1],
+            np.array(mesh.shape.sway, dtype=np.float32, order="C"),  # a copy, as of triangles
             np.asarray(mesh.turn, dtype=np.float64),
             np.asarray(mesh.centre, dtype=np.float64),
-            clip,
+            np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64),
             self._size,
-            edges.seen,
-            edges.triangles,
-            edges.ends,
-            edges.sides,
-            edges.facing,
+            edges,
             self._marked,
         )
 
     def tiles(self) -> Float32:
-        """Return (N, 2) corners of triangles over all tiles with outlines in them, -1..1 across the
-        picture."""
-        corners = np.empty((6 * _runs(self._marked, self._size, np.empty((0, 2), dtype=np.float32)), 2), "f4")
-        _runs(self._marked, self._size, corners)
-        return corners
-
-
-@compiled
-def _add(
-    positions: Float32,
-    sway: Float32,
-    turn: Float64,
-    centre: Float64,
-    clip: Float64,
-    size: tuple[int, int],
-    seen: Float32,
-    triangles: Int32,
-    ends: Int32,
-    sides: Int32,
-    facing: Int8,
-    marked: UInt8,
-) -> None:
-    """Project and mark in one call, as each call from Python costs more than the loops.
-
-    Bounds: `Outliner.add` makes `seen` and checks `sway` for as many vertices as there are positions; edges
-    and triangles are numbers in them, and of each other (`find_edges`). `marked` has a tile for each TILE
-    pixels begun, as `begin` makes it.
-    """
-    _project(positions, sway, turn, centre, clip, size, seen)
-    _outline(seen, triangles, ends, sides, size, facing, marked)
+        """Return (N, 2) corners of triangles over all tiles with outlines, -1..1 across the picture."""
+        edges = np.diff(np.pad(self._marked, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+        row, first = np.nonzero(edges > 0)  # the beginnings of runs of marked tiles, row by row
+        after = np.nonzero(edges < 0)[1]
+        left, right = (2.0 * column * TILE / self._size[0] - 1.0 for column in (first, after))
+        low, top = (2.0 * down * TILE / self._size[1] - 1.0 for down in (row, row + 1))
+        corners = (left, low), (right, low), (left, top), (left, top), (right, low), (right, top)
+        return np.array(corners, dtype=np.float32).transpose(2, 0, 1).reshape(-1, 2)
 
 
 @compiled
 def _project(
-    positions: Float32,
-    sway: Float32,
-    turn: Float64,
-    centre: Float64,
-    clip: Float64,
-    size: tuple[int, int],
-    seen: Float32,
-) -> None:
-    """Write pixels x, y of vertices (V, 3), turned as in face.vert, and a number below 0 if behind it.
+    positions: Float32, sway: Float32, turn: Float64, centre: Float64, clip: Float64, size: tuple[int, int]
+) -> Float32:
+    """Return pixels x, y of vertices (V, 3), turned as in face.vert, and a number below 0 if behind it.
 
-    Bounds: see `_add`.
+    Bounds: `Outliner.add` checks that there are as many `sway` as positions.
     """
+    seen = np.empty((len(positions), 3), dtype=np.float32)
     angle = np.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
     axis = turn / max(angle, 1e-12)
     half_wide, half_high = 0.5 * size[0], 0.5 * size[1]
@@ -184,29 +137,36 @@ def _project(
         seen[i, 0] = half_wide * (1.0 + across / w)
         seen[i, 1] = half_high * (1.0 + up / w)
         seen[i, 2] = 1.0
+    return seen
 
 
 @compiled
-def _outline(
-    seen: Float32,
-    triangles: Int32,
-    ends: Int32,
-    sides: Int32,
+def _mark(
+    positions: Float32,
+    sway: Float32,
+    turn: Float64,
+    centre: Float64,
+    clip: Float64,
     size: tuple[int, int],
-    facing: Int8,
+    edges: Edges,
     marked: UInt8,
 ) -> None:
     """Mark the tiles along borders and along edges between a front-facing and a back-facing triangle.
 
-    Bounds: see `_add`. Pixels are clamped to 0..size - 1 before they become tiles; edges with pixels that are
-    not finite are skipped before: no comparison with a limit holds for them.
+    Bounds: ends and corners are vertices of the shape, of which there are as many as positions; sides are
+    its triangles (`find_edges`). `marked` has a tile for each TILE pixels begun, as `begin` makes it. Pixels
+    are clamped to 0..size - 1 before they become tiles; edges with pixels that are not finite are skipped
+    before: no comparison with a limit holds for them.
     """
+    seen = _project(positions, sway, turn, centre, clip, size)
+    triangles, ends, sides = edges
+    facing = np.empty(len(triangles), dtype=np.int8)
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = seen[a, 0], seen[a, 1]
         area = (seen[b, 0] - ax) * (seen[c, 1] - ay) - (seen[c, 0] - ax) * (seen[b, 1] - ay)
         facing[t] = 2 if abs(area) < 1e-6 else (1 if area > 0.0 else 0)  # 2: edge on, faces neither way
-    wide, high = float(size[0]), float(size[1])
+    wide, high, margin = float(size[0]), float(size[1]), OUTLINE_MARGIN
     for e in range(len(ends)):
         a, b = ends[e, 0], ends[e, 1]
         one = facing[sides[e, 0]]
@@ -217,57 +177,27 @@ def _outline(
         ax, ay = float(seen[a, 0]), float(seen[a, 1])
         bx, by = float(seen[b, 0]), float(seen[b, 1])
         outside = (
-            max(ax, bx) < -MARGIN
-            or max(ay, by) < -MARGIN
-            or min(ax, bx) > wide + MARGIN
-            or min(ay, by) > high + MARGIN
+            max(ax, bx) < -margin
+            or max(ay, by) < -margin
+            or min(ax, bx) > wide + margin
+            or min(ay, by) > high + margin
         )
         length = max(abs(bx - ax), abs(by - ay))
         near = abs(bx - ax) + abs(by - ay) < 8.0 * (wide + high)
         if outside or not (near and length < 4.0 * (wide + high)):
             continue
-        left, right = int(max(min(ax, bx) - MARGIN, 0.0)), int(min(max(ax, bx) + MARGIN, wide - 1.0))
-        low, top = int(max(min(ay, by) - MARGIN, 0.0)), int(min(max(ay, by) + MARGIN, high - 1.0))
+        left, right = int(max(min(ax, bx) - margin, 0.0)), int(min(max(ax, bx) + margin, wide - 1.0))
+        low, top = int(max(min(ay, by) - margin, 0.0)), int(min(max(ay, by) + margin, high - 1.0))
         if right // TILE - left // TILE <= 1 and top // TILE - low // TILE <= 1:  # short, as most edges are
             for row in range(low // TILE, top // TILE + 1):
                 for column in range(left // TILE, right // TILE + 1):
                     marked[row, column] = 1
             continue
-        steps = int(length / MARGIN) + 1
+        steps = int(length / margin) + 1
         for step in range(steps + 1):
             x, y = ax + (bx - ax) * step / steps, ay + (by - ay) * step / steps
-            left, right = int(max(x - MARGIN, 0.0)) // TILE, int(min(x + MARGIN, wide - 1.0)) // TILE
-            low, top = int(max(y - MARGIN, 0.0)) // TILE, int(min(y + MARGIN, high - 1.0)) // TILE
+            left, right = int(max(x - margin, 0.0)) // TILE, int(min(x + margin, wide - 1.0)) // TILE
+            low, top = int(max(y - margin, 0.0)) // TILE, int(min(y + margin, high - 1.0)) // TILE
             for row in range(low, top + 1):
                 for column in range(left, right + 1):
                     marked[row, column] = 1
-
-
-@compiled
-def _runs(marked: UInt8, size: tuple[int, int], corners: Float32) -> int:
-    """Write two triangles for each run of marked tiles if there is room; return the number of runs.
-
-    Bounds: checked for each run; corners have 6 rows for each.
-    """
-    count = 0
-    for row in range(marked.shape[0]):
-        column = 0
-        while column < marked.shape[1]:
-            if marked[row, column] == 0:
-                column += 1
-                continue
-            first = column
-            while column < marked.shape[1] and marked[row, column] != 0:
-                column += 1
-            if 6 * count + 6 <= len(corners):
-                left, right = 2.0 * first * TILE / size[0] - 1.0, 2.0 * column * TILE / size[0] - 1.0
-                low, top = 2.0 * row * TILE / size[1] - 1.0, 2.0 * (row + 1) * TILE / size[1] - 1.0
-                at = 6 * count
-                corners[at, 0], corners[at, 1] = left, low
-                corners[at + 1, 0], corners[at + 1, 1] = right, low
-                corners[at + 2, 0], corners[at + 2, 1] = left, top
-                corners[at + 3, 0], corners[at + 3, 1] = left, top
-                corners[at + 4, 0], corners[at + 4, 1] = right, low
-                corners[at + 5, 0], corners[at + 5, 1] = right, top
-            count += 1
-    return count

@@ -38,8 +38,7 @@ class Pictures:
             self._breadth = texture_breadth(positions, shape.texcoords, shape.triangles)
 
     def choose(self, pixel: float) -> Any:
-        """Return the texture for pixels of this width (m) at the distance of the part; None if it has no
-        picture."""
+        """Return the texture for pixels of this width (m) on the part; None if it has no picture."""
         if self._picture is None:
             return None
         halvings = count_halvings(self._breadth / max(self._picture.size), pixel, max(self._picture.size))
@@ -51,7 +50,6 @@ class Pictures:
         return self._sizes[halvings]
 
     def close(self) -> None:
-        """Free everything allocated on the graphics card."""
         for texture in self._sizes.values():
             texture.release()
         self._sizes.clear()
@@ -66,8 +64,10 @@ def _weigh_by_alpha(pixels: UInt8) -> UInt8:
 
 
 def count_halvings(texel: float, pixel: float, size: int) -> int:
-    """Return how often to halve a picture of `size` texels, `texel` metres wide, to make them about a pixel
-    wide."""
+    """Return how often to halve a picture of `size` texels, so that texels are about a pixel wide.
+
+    texel, pixel: their widths in metres.
+    """
     if not texel > 0 or not pixel > 0:
         return 0
     ratio = MIN_TEXEL * pixel / texel

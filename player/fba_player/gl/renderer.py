@@ -15,7 +15,14 @@ from fba_player.gl._antialias_region import Steps, find_steps
 from fba_player.gl._ground_shadow import ShadowCaster
 from fba_player.gl._lod import Details
 from fba_player.gl._mesh_renderer import FaceRenderer
-from fba_player.gl._resources import RecentlyUsed, load_program, matrix_bytes, set_uniform, write_buffer
+from fba_player.gl._resources import (
+    RecentlyUsed,
+    load_program,
+    make_buffer,
+    matrix_bytes,
+    set_uniform,
+    write_buffer,
+)
 from fba_player.gl._silhouette import Outliner
 from fba_player.view._view import CAPSULE_FLOATS, Eye, Mesh, View
 from fba_player.view.camera import Camera
@@ -46,10 +53,8 @@ class Renderer:
             for name in ("mesh", "capsule", "eye", "studio", "shadow", "cast")
         }
         self._faces = FaceRenderer(context)
-        corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
-        square = np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4")
-        self._studio_buffer = context.buffer(corners.tobytes())
-        self._square = context.buffer(square.tobytes())
+        self._studio_buffer = make_buffer(context, [-1, -1, 3, -1, -1, 3])
+        self._square = make_buffer(context, [-1, -1, 1, -1, -1, 1, 1, 1])
         self._blobs = context.buffer(reserve=MAX_BLOBS * 16, dynamic=True)
         self._shadow = context.vertex_array(
             self._programs["shadow"], [(self._square, "2f", "in_corner"), (self._blobs, "4f/i", "in_blob")]
@@ -58,18 +63,15 @@ class Renderer:
         self._cast = context.vertex_array(self._programs["cast"], [(self._square, "2f", "in_corner")])
         self._darkness: Any = None
         self._backdrop: tuple[tuple[object, ...], Any, Any] | None = None
-        self._studio = context.vertex_array(
-            self._programs["studio"], [(self._studio_buffer, "2f", "in_corner")]
-        )
+        studio = self._programs["studio"]
+        self._studio = context.vertex_array(studio, [(self._studio_buffer, "2f", "in_corner")])
         self._instances = context.buffer(reserve=CAPSULE_FLOATS * 4 * 128, dynamic=True)
-        self._capsule_parts = self._upload(*capsule_mesh())
+        self._capsule_parts = _make_buffers(context, *capsule_mesh())
         self._capsules = self._capsule_array()
-        self._eye_parts = self._upload(*sphere_mesh())
-        self._eye = context.vertex_array(
-            self._programs["eye"],
-            [(self._eye_parts[0], "3f", "in_position")],
-            index_buffer=self._eye_parts[1],
-        )
+        self._eye_parts = _make_buffers(context, *sphere_mesh())
+        points, triangles = self._eye_parts
+        attributes = [(points, "3f", "in_position")]
+        self._eye = context.vertex_array(self._programs["eye"], attributes, index_buffer=triangles)
         self._outliner = Outliner()
         self._details = Details()
         self._extras = ExtrasRenderer(context)
@@ -108,8 +110,7 @@ class Renderer:
         return find_steps(drawn, matrix, size, self._outliner)
 
     def _set_camera(self, *seen: object) -> None:
-        """Set the camera in all programs: its position, the matrix (4, 4) from world to clip space, and the
-        size of a pixel at a distance of 1."""
+        """Set the camera in all programs: its position, the matrix to clip space, a pixel's size."""
         if seen == self._seen:
             return
         self._seen = seen
@@ -131,9 +132,6 @@ class Renderer:
             self._eye, *self._eye_parts, *self._programs.values(),
         ):  # fmt: skip
             part.release()
-
-    def _upload(self, vertices: Float32, triangles: Int32) -> tuple[Any, Any]:
-        return self._gl.buffer(vertices.tobytes()), self._gl.buffer(triangles.tobytes())
 
     def _capsule_array(self) -> Any:
         return self._gl.vertex_array(
@@ -225,8 +223,7 @@ class Renderer:
         gl, shape = self._gl, mesh.shape
         positions = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
         normals = gl.buffer(reserve=mesh.positions.size * 4, dynamic=True)
-        colours = gl.buffer(np.ascontiguousarray(shape.colours, dtype="f4").tobytes())
-        triangles = gl.buffer(np.ascontiguousarray(shape.triangles, dtype="i4").tobytes())
+        colours, triangles = make_buffer(gl, shape.colours), make_buffer(gl, shape.triangles, "i4")
         array = gl.vertex_array(
             self._programs["mesh"],
             [(positions, "3f", "in_position"), (normals, "3f", "in_normal"), (colours, "4f", "in_colour")],
@@ -279,6 +276,10 @@ class Renderer:
         set_uniform(program, "ball", matrix_bytes(axes))
         set_uniform(program, "tint", ball.tint)
         self._eye.render()
+
+
+def _make_buffers(context: Any, vertices: Float32, triangles: Int32) -> tuple[Any, Any]:
+    return make_buffer(context, vertices), make_buffer(context, triangles, "i4")
 
 
 def _release(parts: list[Any]) -> None:

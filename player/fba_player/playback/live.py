@@ -11,13 +11,14 @@ import threading
 import time as wall
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Int64
 from fba.choices import BapTableOrAuto
 from fba.codec import Block, Decoder, FrameBuffer, StreamInfo, marked_table
 from fba.errors import BitstreamError, FbaError, FbaWarning
+from fba.face.resolve import FaceSettings
 from fba.formats.step_choice import choose_steps
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
 from fba_player.playback.timeline import Timeline
@@ -26,15 +27,12 @@ from fba_player.playback.transport import BUFFER_SECONDS
 CHUNK_BYTES = 1 << 16
 """Bytes read at once, at most."""
 PATIENCE_SECONDS = 0.5
-"""Seconds that `wait` gives a slow stream after its first frame to fill the buffer and to show whether it has
-a face and a body."""
+"""Seconds that `wait` gives a slow stream to fill the buffer and to show whether it has a face and a body."""
 CHECK_BAP_STEPS_AFTER = 4
 """Seconds of a body after which it is checked, once, whether they look right with these BAP steps."""
 CHOOSE_BAP_STEPS_AFTER = 1.25
 """Seconds of a body after which the BAP steps are chosen by how it moves; nothing is shown before. A file in
 a pipe arrives faster: its end, with the mark, comes within `PATIENCE_SECONDS`."""
-
-
 MARK_BYTES = 64
 """More than a mark and its start code take."""
 
@@ -134,25 +132,16 @@ class LiveAnimation:
         return self._now.animation(self.name)
 
     def info(self) -> StreamInfo:
-        """Return the planes that have arrived, their bits and the bit rate; without the list of
-        parameters."""
+        """Return the planes that have arrived, their bits and the bit rate, but no parameters."""
         now, size = self._now, self.received
         first, last = (int(now.index[0]), int(now.index[-1])) if len(now.index) else (0, -1)
         return StreamInfo(
-            format="fba",
-            size=size,
-            rate=now.rate,
-            frames=len(now.index),
-            duration=Fraction(last - first + 1) / now.rate,
-            start=first / now.rate,
-            skipped=last - first + 1 - len(now.index),
-            face=None,
-            body=None,
-            intra_planes=int(now.plane_intra.sum()),
-            plane_bits=now.plane_bits,
-            plane_intra=now.plane_intra,
+            format="fba", size=size, rate=now.rate, frames=len(now.index),
+            duration=Fraction(last - first + 1) / now.rate, start=first / now.rate,
+            skipped=last - first + 1 - len(now.index), face=None, body=None,
+            intra_planes=int(now.plane_intra.sum()), plane_bits=now.plane_bits, plane_intra=now.plane_intra,
             frame_index=now.index,
-        )
+        )  # fmt: skip
 
     @property
     def arrived(self) -> int:
@@ -236,8 +225,7 @@ class LiveAnimation:
             self._changed.notify_all()
 
     def _is_marked(self, new: int) -> bool:
-        """Return whether the withheld bytes contain a mark. new: number of bytes at their end not searched
-        yet."""
+        """Return whether the withheld bytes contain a mark. new: bytes at their end not searched yet."""
         assert self._held is not None
         begin = max(len(self._held) - new - MARK_BYTES, 0)
         return b"bap_steps=" in self._held[begin:] and marked_table(self._held) is not None
@@ -293,12 +281,8 @@ class LiveAnimation:
         )
 
     def _check_bap_steps(self, *, at_end: bool = False) -> None:
-        now = self._now
-        if (
-            self._checked_bap_steps
-            or now.body is None
-            or (self.duration < CHECK_BAP_STEPS_AFTER and not at_end)
-        ):
+        now, due = self._now, at_end or self.duration >= CHECK_BAP_STEPS_AFTER
+        if self._checked_bap_steps or now.body is None or not due:
             return
         from fba.body.plausibility import find_doubt
 
@@ -320,18 +304,8 @@ class LiveTimeline(Timeline):
     block = 256
     animation: Any
 
-    def __init__(self, animation: LiveAnimation, model: object = None) -> None:
-        super().__init__(animation, model)  # type: ignore[arg-type]
-
-    @property
-    def growing(self) -> bool:  # type: ignore[override]
-        """Whether more may arrive."""
-        return bool(self.animation.growing)
-
-    @property
-    def arrived(self) -> int:  # type: ignore[override]
-        """A counter that changes with every frame, and at the end."""
-        return int(self.animation.arrived)
+    def __init__(self, animation: LiveAnimation, model: FaceSettings | None = None) -> None:
+        super().__init__(cast(Animation, animation), model)
 
 
 def wait_for(live: LiveAnimation, say: Callable[[str], None], after: float = 1.0) -> None:

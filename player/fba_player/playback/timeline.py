@@ -10,6 +10,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable
 from fractions import Fraction
+from typing import Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,11 +22,13 @@ from fba.face.resolve import FaceSettings
 from fba.parameters import BAP_COUNT, FAP_COUNT
 from fba.tracks import hold
 
+State = TypeVar("State")
+
 TURN = 2 * math.pi / 1e-5
 """A full turn in units of a BAP."""
 SHIFTS = slice(180, 183)
 """Columns of the BAPs that are millimetres, not angles."""
-BLOCK = 2048
+BLOCK_FRAMES = 2048
 CACHED_BLOCKS = 4
 """Blocks of frames in memory."""
 FRAME_ROUNDING = 1e-6
@@ -38,22 +41,17 @@ class Timeline:
     animation: may grow while `growing` is True. model: gives the definitions of visemes and expressions, and
     the interpolation table; by default the built-in ones. A time before the first or after the last frame
     gives that frame; between two frames, values are interpolated, also over skipped frames, unless
-    `interpolate` is False: then the earlier frame is shown. growing: whether frames still arrive
-    (`fba_player.playback.live`); arrived: a counter that changes whenever some did.
+    `interpolate` is False: then the earlier frame is shown.
     """
 
-    growing = False
-    arrived = 0
-    block = BLOCK
+    block = BLOCK_FRAMES
     """Frames resolved at once."""
 
     def __init__(self, animation: Animation, model: FaceSettings | None = None) -> None:
         self.animation = animation
         self.interpolate = True
-        self._resolvers: list[Resolver] = [Resolver(model)]
-        self._bodies: list[Int32] = [np.zeros(BAP_COUNT, dtype=np.int32)]
-        self._faces_shown: OrderedDict[int, Float32] = OrderedDict()
-        self._bodies_shown: OrderedDict[int, Int32] = OrderedDict()
+        self._faces = _Blocks(self.block, Resolver(model), self._resolve_faces)
+        self._bodies = _Blocks(self.block, np.zeros(BAP_COUNT, dtype=np.int32), self._resolve_bodies)
 
     @property
     def rate(self) -> Fraction:
@@ -64,6 +62,16 @@ class Timeline:
     def frames(self) -> int:
         """How many frames there are."""
         return len(self.animation)
+
+    @property
+    def growing(self) -> bool:
+        """Whether more frames may arrive."""
+        return bool(getattr(self.animation, "growing", False))
+
+    @property
+    def arrived(self) -> int:
+        """A counter that changes with every frame that arrives, and at the end."""
+        return int(getattr(self.animation, "arrived", 0))
 
     @property
     def start(self) -> Fraction:
@@ -81,33 +89,27 @@ class Timeline:
         return self.start + self.duration
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """Return (frame, next frame, weight of the next) at a time in seconds, frames as positions in the
-        animation.
+        """Return (frame, next frame, weight of the next) at a time in seconds, frames as positions.
 
         Raises ValueError for a time that is not finite, or an animation without frames.
         """
-        if not math.isfinite(time):
-            raise ValueError(f"the time must be a finite number of seconds, not {time}")
-        index = self.animation.index
-        if not len(index):
+        if not self.frames:
             raise ValueError("the animation has no frames")
-        return frame_position(index, self.rate, time)
+        return frame_position(self.animation.index, self.rate, time)
 
     def time_of(self, frame: int) -> Fraction:
         """Return the time of a frame, by its position in the animation: seconds, exact."""
         return Fraction(int(self.animation.index[frame])) / self.rate
 
     def faps(self, time: float) -> Float32:
-        """Return the FAPs shown at a time in seconds, float32 (68,); zeros where the animation has no
-        face."""
+        """Return the FAPs shown at a time in seconds, float32 (68,); zeros without a face."""
         if self.animation.face is None:
             return np.zeros(68, dtype=np.float32)
         before, after, share = self.position(time)
-        first = self._face(before)
+        first = self._faces.row(before)
         if share == 0.0 or not self.interpolate:
             return first
-        shown: Float32 = first + (self._face(after) - first) * np.float32(share)
-        return shown
+        return np.asarray(first + (self._faces.row(after) - first) * np.float32(share))
 
     def baps(self, time: float) -> Float64:
         """Return the BAPs shown at a time in seconds, float64 (296,); zeros where the animation has no body.
@@ -119,11 +121,10 @@ class Timeline:
         if self.animation.body is None:
             return np.zeros(BAP_COUNT)
         before, after, share = self.position(time)
-        first = self._body(before).astype(np.float64)
+        first = self._bodies.row(before).astype(np.float64)
         if share == 0.0 or not self.interpolate:
             return first
-        shown: Float64 = first + _shorten_turns(self._body(after) - first) * share
-        return shown
+        return np.asarray(first + _shorten_turns(self._bodies.row(after) - first) * share)
 
     def many(self, times: npt.ArrayLike) -> tuple[Float32, Float64]:
         """Return the FAPs, float32 (T, 68), and BAPs, float64 (T, 296), at times (T,) in seconds.
@@ -142,72 +143,69 @@ class Timeline:
         share = np.clip((at - index[before]) / gap, 0.0, 1.0) * self.interpolate
         faces, bodies = np.zeros((len(at), FAP_COUNT), np.float32), np.zeros((len(at), BAP_COUNT))
         if self.animation.face is not None:
-            first = self._gather_rows(before, self._face, self._faces_shown)
-            way = self._gather_rows(after, self._face, self._faces_shown) - first
-            faces = first + way * share.astype(np.float32)[:, None]
+            first = self._faces.rows(before)
+            change = self._faces.rows(after) - first
+            faces = first + change * share.astype(np.float32)[:, None]
         if self.animation.body is not None:
-            start = self._gather_rows(before, self._body, self._bodies_shown).astype(np.float64)
-            turn = self._gather_rows(after, self._body, self._bodies_shown) - start
+            start = self._bodies.rows(before).astype(np.float64)
+            turn = self._bodies.rows(after) - start
             bodies = start + _shorten_turns(turn) * share[:, None]
         return faces, bodies
 
-    def _gather_rows(
-        self,
-        frames: Intp,
-        resolve_frame: Callable[[int], Array],
-        shown: OrderedDict[int, Array],
-    ) -> Array:
-        """Return the rows of many frames. resolve_frame: resolves a frame with its block, which is then in
-        `shown`."""
-        blocks = frames // self.block
+    def _resolve_faces(self, frames: slice, before: Resolver) -> tuple[Float32, Resolver]:
+        assert self.animation.face is not None
+        resolver = before.copy()
+        return resolver.push(self.animation.face[frames]), resolver
+
+    def _resolve_bodies(self, frames: slice, before: Int32) -> tuple[Int32, Int32]:
+        assert self.animation.body is not None
+        part = self.animation.body[frames]
+        rows: Int32 = part.values if part.mask.all() else hold(part.values, part.mask, before)
+        return rows, rows[-1].copy()
+
+
+class _Blocks(Generic[State]):
+    """The values of a track in blocks of frames, resolved when they are needed; some are cached.
+
+    size: frames of a block. before: the state before the first. resolve: returns the rows of frames, which
+    follow a state, and the state after them.
+    """
+
+    def __init__(
+        self, size: int, before: State, resolve: Callable[[slice, State], tuple[Array, State]]
+    ) -> None:
+        self._size, self._resolve = size, resolve
+        self._states = [before]
+        self._cached: OrderedDict[int, Array] = OrderedDict()
+
+    def row(self, frame: int) -> Array:
+        """Return the values of a frame."""
+        block, row = divmod(frame, self._size)
+        cached = self._cached.get(block)
+        if cached is None or row >= len(cached):
+            while len(self._states) <= block:
+                self._states.append(self._resolve_block(len(self._states) - 1)[1])
+            cached = self._cached[block] = self._resolve_block(block)[0]
+            while len(self._cached) > CACHED_BLOCKS:
+                self._cached.popitem(last=False)
+        return np.asarray(cached[row])
+
+    def rows(self, frames: Intp) -> Array:
+        """Return the values of many frames."""
+        blocks = frames // self._size
         parts = []
         for block in np.unique(blocks).tolist():
-            in_block = blocks == block
-            resolve_frame(int(frames[in_block].max()))
-            parts.append((in_block, shown[block][frames[in_block] - block * self.block]))
+            chosen = blocks == block
+            self.row(int(frames[chosen].max()))
+            parts.append((chosen, self._cached[block][frames[chosen] - block * self._size]))
         first = parts[0][1]
         gathered = np.zeros((len(frames), first.shape[1]), dtype=first.dtype)
-        for in_block, rows in parts:
-            gathered[in_block] = rows
+        for chosen, rows in parts:
+            gathered[chosen] = rows
         return gathered
 
-    def _face(self, frame: int) -> Float32:
-        block, row = divmod(frame, self.block)
-        shown = self._faces_shown.get(block)
-        if shown is None or row >= len(shown):
-            track = self.animation.face
-            assert track is not None
-            while len(self._resolvers) <= block:
-                resolver = self._resolvers[-1].copy()
-                resolver.push(track[self._rows(len(self._resolvers) - 1)])
-                self._resolvers.append(resolver)
-            shown = self._resolvers[block].copy().push(track[self._rows(block)])
-            _cache_block(self._faces_shown, block, shown)
-        face: Float32 = shown[row]
-        return face
-
-    def _body(self, frame: int) -> Int32:
-        block, row = divmod(frame, self.block)
-        shown = self._bodies_shown.get(block)
-        if shown is None or row >= len(shown):
-            while len(self._bodies) <= block:
-                self._bodies.append(self._held_body(len(self._bodies) - 1)[-1].copy())
-            shown = self._held_body(block)
-            _cache_block(self._bodies_shown, block, shown)
-        body: Int32 = shown[row]
-        return body
-
-    def _held_body(self, block: int) -> Int32:
-        track = self.animation.body
-        assert track is not None
-        part = track[self._rows(block)]
-        if part.mask.all():
-            return part.values
-        held: Int32 = hold(part.values, part.mask, self._bodies[block])
-        return held
-
-    def _rows(self, block: int) -> slice:
-        return slice(block * self.block, (block + 1) * self.block)
+    def _resolve_block(self, block: int) -> tuple[Array, State]:
+        return self._resolve(slice(block * self._size, (block + 1) * self._size), self._states[block])
 
 
 class CaptureTimes:
@@ -221,47 +219,21 @@ class CaptureTimes:
 
     def __init__(self, times: Float64, rate: Fraction) -> None:
         self._times = times
-        self._rate = rate
         self.interpolate = True
-
-    @property
-    def frames(self) -> int:
-        """Number of frames."""
-        return len(self._times)
-
-    @property
-    def rate(self) -> Fraction:
-        """Frames a second, as the capture says."""
-        return self._rate
-
-    @property
-    def start(self) -> Fraction:
-        """Time of the first frame, seconds."""
-        return self.time_of(0)
-
-    @property
-    def end(self) -> Fraction:
-        """Time one frame period after the last frame, seconds."""
-        return self.time_of(len(self._times) - 1) + 1 / self._rate
-
-    @property
-    def duration(self) -> Fraction:
-        """Seconds from start to end."""
-        return self.end - self.start
+        self.frames, self.rate = len(times), rate
+        self.start, self.end = self.time_of(0), self.time_of(len(times) - 1) + 1 / rate
+        self.duration = self.end - self.start
 
     def time_of(self, frame: int) -> Fraction:
         """Return the time of a frame, seconds, to a microsecond."""
         return Fraction(float(self._times[frame])).limit_denominator(1_000_000)
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """Return (frame, next frame, weight of the next) at a time in seconds; ValueError if it is not
-        finite."""
-        if not math.isfinite(time):
-            raise ValueError(f"the time must be a finite number of seconds, not {time}")
+        """Return (frame, next frame, weight of the next) at a time; ValueError if it is not finite."""
+        _check_finite(time)
         last = len(self._times) - 1
         # a frame's own time shows that frame, whatever the rounding
-        before = int(np.searchsorted(self._times, time + 1e-6, side="right")) - 1
-        before = min(max(before, 0), last)
+        before = min(max(int(np.searchsorted(self._times, time + 1e-6, side="right")) - 1, 0), last)
         after = min(before + 1, last)
         gap = float(self._times[after] - self._times[before])
         share = (time - float(self._times[before])) / gap if gap > 0 else 0.0
@@ -271,11 +243,12 @@ class CaptureTimes:
 def frame_position(
     index: Int64, rate: Fraction, time: float, rounding: float = FRAME_ROUNDING
 ) -> tuple[int, int, float]:
-    """Return (frame, next frame, weight of the next) at a time in seconds, as `Timeline.position`.
+    """Return (frame, next frame, weight of the next) at a time; ValueError if it is not finite.
 
     index: (T,), ascending numbers of frames at this rate. rounding: frame periods within which a time
     counts as that of a frame.
     """
+    _check_finite(time)
     at = time * rate.numerator / rate.denominator
     if abs(at - round(at)) < rounding:
         at = float(round(at))  # a frame's own time shows that frame, whatever the rounding
@@ -286,19 +259,18 @@ def frame_position(
     return before, after, min(max((at - int(index[before])) / gap, 0.0), 1.0) if gap else 0.0
 
 
-def _shorten_turns(way: Float64) -> Float64:
+def _check_finite(time: float) -> None:
+    if not math.isfinite(time):
+        raise ValueError(f"the time must be a finite number of seconds, not {time}")
+
+
+def _shorten_turns(changes: Float64) -> Float64:
     """Return the changes of BAPs (..., 296), each angle the shorter way round."""
-    if not way.size or max(way.max(), -way.min()) <= TURN / 2:
-        return way
-    shorter: Float64 = way - TURN * np.rint(way / TURN)
-    shorter[..., SHIFTS] = way[..., SHIFTS]
+    if not changes.size or max(changes.max(), -changes.min()) <= TURN / 2:
+        return changes
+    shorter: Float64 = changes - TURN * np.rint(changes / TURN)
+    shorter[..., SHIFTS] = changes[..., SHIFTS]
     return shorter
-
-
-def _cache_block(shown: OrderedDict[int, Array], block: int, values: Array) -> None:
-    shown[block] = values
-    while len(shown) > CACHED_BLOCKS:
-        shown.popitem(last=False)
 
 
 def timecode(time: float, rate: Fraction) -> str:

@@ -85,12 +85,8 @@ class Transport:
     @property
     def share(self) -> float:
         """The current time as a share: 0 at the start, 1 at the last frame or after."""
-        return self.share_of(self.time)
-
-    def share_of(self, time: float) -> float:
-        """Return a time as a share: 0 at the start, 1 at the last frame or after."""
         duration = self._last_time() - self.start
-        return min(max((time - self.start) / duration, 0.0), 1.0) if duration > 0 else 0.0
+        return min(max((self.time - self.start) / duration, 0.0), 1.0) if duration > 0 else 0.0
 
     @property
     def motion(self) -> Motion:
@@ -263,15 +259,9 @@ class Transport:
 
     def text(self) -> str:
         """Return the time, frame and speed as text: "0:01.240 / 0:04.000 frame 31 / 99 1x"."""
-        time = self.time
-        parts = [
-            f"{clock_text(time - self.start)} / {clock_text(self.duration)}",
-            self.frame_text(),
-            f"{self.speed:g}x",
-        ]
-        if self.loop:
-            parts.append("loop")
-        return "   ".join(parts)
+        clock = f"{clock_text(self.time - self.start)} / {clock_text(self.duration)}"
+        parts = [clock, self.frame_text(), f"{self.speed:g}x"]
+        return "   ".join([*parts, "loop"] if self.loop else parts)
 
     def frame_text(self) -> str:
         """Return the numbers of the current and of the last frame, from 0: "frame 31 / 99"."""
@@ -280,9 +270,8 @@ class Transport:
     def timecode(self, time: float | None = None) -> str:
         """Return the time code "h:mm:ss:ff" of a time, by default the current one.
 
-        If the stream carries time codes, it is theirs: the times of frames follow them.
-        Hours, minutes and seconds are those of the time itself at any rate; ff counts the frame periods that
-        have begun in that second, from 00.
+        Times of frames follow the time codes of a stream, if it has any. Hours, minutes and seconds are those
+        of the time itself at any rate; ff counts the frame periods that have begun in that second, from 00.
         """
         return timecode(self.time if time is None else time, self._timeline.rate)
 
@@ -290,8 +279,7 @@ class Transport:
         return float(self._timeline.time_of(self._timeline.frames - 1))
 
     def _stop(self) -> float:
-        """Return the time at which the last frame has been shown; in a live stream, the time of its last
-        frame."""
+        """Return when the last frame has been shown; in a live stream, the time of its last frame."""
         return self._last_time() if self._timeline.growing else self.end
 
     def _low(self) -> float:

@@ -67,8 +67,7 @@ class Bones:
         return cls(parents, children, templates, joint_radii, shadow_joints)
 
     def capsules(self, matrices: Float64) -> Float32:
-        """Return (2J - 1, 16) capsules for joint matrices (J, 4, 4): the bones, then a sphere at every
-        joint."""
+        """Return (2J - 1, 16) capsules for joint matrices (J, 4, 4): the bones, then spheres at joints."""
         positions = matrices[:, :3, 3]
         bones = self.templates.copy()
         bones[:, 0:3] = positions[self.parents]
@@ -77,8 +76,7 @@ class Bones:
         return np.concatenate([bones, spheres(positions, self.joint_radii, JOINT)])
 
     def shadows(self, matrices: Float64) -> Float32:
-        """Return float32 (K, 4): soft shadows under hips and feet, fainter with height, as in
-        `View.blobs`."""
+        """Return float32 (K, 4): shadows under hips and feet, fainter with height, as in `View.blobs`."""
         shadows = []
         for joint, (_, radius, darkness, rest) in zip(self.shadow_joints, SHADOWS, strict=True):
             x, y, z = matrices[joint, :3, 3]

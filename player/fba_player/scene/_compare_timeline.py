@@ -11,7 +11,7 @@ import numpy as np
 from fba.arrays import Float64, Int64
 from fba_player.playback.timeline import FRAME_ROUNDING, Timeline, frame_position
 
-MAX_RATE = 1_000_000
+MAX_COMMON_RATE = 1_000_000
 """Largest common rate, in frames per second, of performances with different rates."""
 
 
@@ -38,16 +38,15 @@ class CompareTimeline:
     @property
     def start(self) -> Fraction:
         """Start of the earliest performance."""
-        return min(one.start + later for one, later in self._shown())
+        return min(timeline.start + later for timeline, later in self._shown())
 
     @property
     def end(self) -> Fraction:
         """End of the latest performance."""
-        return max(one.end + later for one, later in self._shown())
+        return max(timeline.end + later for timeline, later in self._shown())
 
     @property
     def duration(self) -> Fraction:
-        """Seconds from start to end."""
         return self.end - self.start
 
     @property
@@ -57,37 +56,30 @@ class CompareTimeline:
 
     @property
     def growing(self) -> bool:
-        """Whether a performance is still arriving."""
-        return any(one.growing for one in self.timelines)
+        return any(timeline.growing for timeline in self.timelines)
 
     @property
     def arrived(self) -> int:
-        """A number that changes whenever more of a performance has arrived."""
-        return sum(one.arrived for one in self.timelines)
+        return sum(timeline.arrived for timeline in self.timelines)
 
     @property
     def interpolate(self) -> bool:
-        """Whether values between two frames are interpolated; set for all performances."""
         return self.timelines[0].interpolate
 
     @interpolate.setter
     def interpolate(self, interpolate: bool) -> None:
-        for one in self.timelines:
-            one.interpolate = interpolate
+        for timeline in self.timelines:
+            timeline.interpolate = interpolate
 
     def own_time(self, number: int, time: float) -> float:
         """Return the time of performance `number` at a common time, seconds."""
         return time - float(self.later[number])
 
     def time_of(self, frame: int) -> Fraction:
-        """Return exact common time of a frame by its index."""
         rate, index = self._frames()
         return Fraction(int(index[frame])) / rate
 
     def position(self, time: float) -> tuple[int, int, float]:
-        """Return (frame, next frame, weight of the next) at a time; ValueError if it is not finite."""
-        if not math.isfinite(time):
-            raise ValueError(f"the time must be a finite number of seconds, not {time}")
         rate, index = self._frames()
         return frame_position(index, rate, time, FRAME_ROUNDING * float(rate / self.rate))
 
@@ -103,17 +95,15 @@ class CompareTimeline:
         """Return a common rate, and the ascending indices of all frames at that rate."""
         arrived = self.arrived
         if self._merged is None or self._merged[0] != arrived:
-            parts = [one.rate for one in self.timelines] + [1 / later for later in self.later if later]
-            rate = Fraction(
-                math.lcm(*(abs(part).numerator for part in parts)),
-                math.gcd(*(abs(part).denominator for part in parts)),
-            )
-            if rate > MAX_RATE:
-                rate = Fraction(MAX_RATE)
+            parts = [timeline.rate for timeline in self.timelines]
+            parts += [1 / later for later in self.later if later]
+            common = math.lcm(*(abs(part).numerator for part in parts))
+            rate = Fraction(common, math.gcd(*(part.denominator for part in parts)))
+            rate = min(rate, Fraction(MAX_COMMON_RATE))
             indices = []
-            for one, later in self._shown():
-                step, first = rate / one.rate, later * rate
-                index = one.animation.index * step.numerator // step.denominator
+            for timeline, later in self._shown():
+                step, first = rate / timeline.rate, later * rate
+                index = timeline.animation.index * step.numerator // step.denominator
                 indices.append(index + first.numerator // first.denominator)
             self._merged = (arrived, rate, np.unique(np.concatenate(indices)))
         return self._merged[1:]
@@ -121,8 +111,8 @@ class CompareTimeline:
 
 def _later(timelines: tuple[Timeline, ...]) -> tuple[Fraction, ...]:
     first = timelines[0]
-    together = [one.start < first.end and first.start < one.end for one in timelines]
-    return tuple(
-        Fraction(0) if meets else first.start - one.start
-        for one, meets in zip(timelines, together, strict=True)
-    )
+    later = []
+    for timeline in timelines:
+        overlaps = timeline.start < first.end and first.start < timeline.end
+        later.append(Fraction(0) if overlaps else first.start - timeline.start)
+    return tuple(later)

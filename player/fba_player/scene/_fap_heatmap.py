@@ -23,6 +23,7 @@ MEASURED_STEPS = 100
 MEASURED_ANGLE = 10_000
 """Value of a FAP that is an angle: 0.1 rad."""
 GLOSS = 0.15
+"""Of painted surfaces."""
 SHADES = 33
 """Number of colours in the legend."""
 MIN_MOVEMENT = 1e-6
@@ -46,8 +47,7 @@ class FapHeatmap:
         """A legend of the colours in millimetres."""
         unit = "0.1 rad" if self.fap.unit == "AU" else f"+{self.value} steps of {self.fap.unit}/1024"
         moved = f"mm moved by {unit}" if self.most > MIN_MOVEMENT else "moves no vertex of this face"
-        stops = tuple(tuple(float(v) for v in row) for row in heat_colours(np.linspace(0, 1, SHADES)))
-        return Legend(self.fap.label, moved, self.most * 1000, stops)  # type: ignore[arg-type]
+        return heat_legend(self.fap.label, moved, self.most * 1000)
 
     def paint(self, meshes: list[FaceMesh]) -> list[FaceMesh]:
         """Return the meshes in these colours; parts that are not the face's get the colour of 0."""
@@ -75,27 +75,22 @@ class FapHeatmap:
         neutral, moved = figure.pose(np.zeros_like(self._values)).positions, figure.pose(self._values)
         turn = rotation_vector(moved.turn[:3, :3])
         turned = turn_partly(moved.positions, figure.sway, turn, figure.centre)
-        distances: Float32 = np.linalg.norm(turned - neutral, axis=1).astype(np.float32)
-        return distances
+        return np.asarray(np.linalg.norm(turned - neutral, axis=1), dtype=np.float32)
 
     def _shape(self, mesh: FaceMesh) -> FaceShape:
         shape = mesh.shape
         if shape not in self._shapes:
             colours = np.full((len(mesh.positions), 4), GLOSS, dtype=np.float32)
             colours[:, :3] = self._colours(self._part_distances(shape, len(mesh.positions)))
-            self._shapes[shape] = replace(
-                shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None, coarser=None
-            )
+            self._shapes[shape] = plain_colours(shape, colours)
         return self._shapes[shape]
 
     def _part_distances(self, shape: FaceShape, count: int) -> Float32:
         """Return float32 (count,): the movement of a part's vertices; 0 for a part that is not the face's."""
-        try:
-            rows = self._figure.rows(shape.name)
-        except KeyError:
+        if shape.name not in self._figure.model.starts:
             return np.zeros(count, dtype=np.float32)
-        own = self.distances[rows]
-        return own if len(own) == count else np.zeros(count, dtype=np.float32)
+        distances = self.distances[self._figure.rows(shape.name)]
+        return distances if len(distances) == count else np.zeros(count, dtype=np.float32)
 
     def _ball(self, number: int, vertices: Float32) -> MeshShape:
         """Return an eyeball coloured by the movement of its points."""
@@ -110,6 +105,18 @@ class FapHeatmap:
         share = distances / max(self.most, MIN_MOVEMENT)
         share[distances <= MIN_MOVEMENT] = 0.0
         return linear_light(heat_colours(share))
+
+
+def plain_colours(shape: FaceShape, colours: Float32) -> FaceShape:
+    """Return the shape in these colours alone, without picture, relief and levels of detail."""
+    return replace(
+        shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None, coarser=None
+    )
+
+
+def heat_legend(title: str, unit: str, most: float) -> Legend:
+    """Return the legend of heat colours for values from 0 to `most`."""
+    return Legend(title, unit, most, tuple(map(tuple, heat_colours(np.linspace(0, 1, SHADES)).tolist())))
 
 
 def heat_colours(shares: Floating) -> Float64:

@@ -12,10 +12,11 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
 from fba.face.feature_points import row_of
+from fba.rotations import unit
 from fba_player._figure.face import FaceFigure
 from fba_player._mesh.primitives import tube_mesh
 from fba_player.scene._skin_lines import SkinLine, skin_lines
-from fba_player.view._geometry import unit_rows
+from fba_player.view._geometry import transform
 from fba_player.view._view import FaceMesh, FaceShape, Mesh, MeshShape, spheres, srgb
 
 POINT = (*srgb("#f0a04b"), 0.3)
@@ -76,11 +77,8 @@ class PointView:
 
     def eyeballs(self, faps: Float32, matrix: Float64) -> Float32:
         """Return float32 (E, 16): capsules, plain eyeballs."""
-        eyes = self._figure.eyes(faps, matrix)
-        if not eyes:
-            return spheres(np.zeros((0, 3)), np.zeros(0), EYEBALL)
-        radii = [float(np.linalg.norm(eye.matrix[:3, 0])) for eye in eyes]
-        return spheres([eye.matrix[:3, 3] for eye in eyes], radii, EYEBALL)
+        frames = np.array([eye.matrix for eye in self._figure.eyes(faps, matrix)]).reshape(-1, 4, 4)
+        return spheres(frames[:, :3, 3], np.linalg.norm(frames[:, :3, 0], axis=1), EYEBALL)
 
     def dull_face(self, faps: Float32, matrix: Float64, *, on_body: bool = False) -> list[FaceMesh]:
         """Return the face in one dull colour."""
@@ -109,8 +107,7 @@ class PointView:
         return meshes
 
     def _rings(self, faps: Float32, matrix: Float64) -> tuple[list[Float64], Float64]:
-        """Return the rims of iris and pupil of each eye in the world, (RING + 1, 3) each, and a point behind
-        them."""
+        """Return the rims of irises and pupils in the world, (RING + 1, 3) each, and a point behind them."""
         turn = np.linspace(0, 2 * np.pi, RING + 1)
         rings, behind = [], np.zeros(3)
         for eye in self._figure.eyes(faps, matrix):
@@ -119,7 +116,7 @@ class PointView:
             for share in (eye.iris, eye.pupil):
                 ring = [np.cos(turn) * share, np.sin(turn) * share, np.full(len(turn), np.sqrt(1 - share**2))]
                 local = np.stack(ring, axis=1) * (1 + INSET / radius)
-                rings.append(local @ eye.matrix[:3, :3].T + eye.matrix[:3, 3])
+                rings.append(transform(local, eye.matrix))
         return rings, behind
 
 
@@ -137,8 +134,8 @@ class _Tubes:
             np.gradient(line, axis=0) for line in np.split(points, np.cumsum(self.lengths)[:-1])
         ])  # fmt: skip
         # Lines lie on the head, so the direction out of it is never along one.
-        aside = unit_rows(np.cross(along, points - inside))
-        out = unit_rows(np.cross(aside, along))
+        aside = unit(np.cross(along, points - inside))
+        out = unit(np.cross(aside, along))
         turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
         normals = aside[:, None] * np.cos(turn)[:, None] + out[:, None] * np.sin(turn)[:, None]
         positions = points[:, None] + normals * self.radii[:, None, None]
@@ -147,8 +144,7 @@ class _Tubes:
 
 
 def _make_tubes(lines: list[tuple[str, int]], raised: float = 0.0) -> _Tubes:
-    """Return the tubes for lines, each given by its kind and its number of points. raised: as in
-    `MeshShape`."""
+    """Return the tubes for lines, given as (kind, number of points). raised: as in `MeshShape`."""
     lengths = tuple(count for _, count in lines)
     radii = np.concatenate([np.zeros(0), *(np.full(count, RADII[kind]) for kind, count in lines)])
     colours = [np.tile([*COLOURS[kind], 0.0], (count * AROUND, 1)) for kind, count in lines]

@@ -22,7 +22,7 @@ ARM_REACH = 1.0
 """Half the width (m) of a person with stretched arms."""
 LOWER = 0.09
 """Metres below the root of a person who walks away at which the middle of the picture is."""
-HEAD = "skullbase"
+HEAD_JOINT = "skullbase"
 LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
 
@@ -40,7 +40,6 @@ class Extent:
 
     @property
     def upper_half(self) -> Subject:
-        """The subject from the hips up."""
         subject = self.subject
         x, y, z = subject.centre
         top = y + subject.half_height
@@ -62,15 +61,14 @@ def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HE
     legs_move = bool(legs.size) and bool(np.abs(legs - legs[0]).max() > MAX_STANDING_TRAVEL)
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
     if not np.isfinite(high - low).all() or (high - low).max() > MAX_FIXED_TRAVEL:
-        x, y, z = (float(v) for v in positions[0, 0])
-        more = _head_above(positions, names, headroom)
-        subject = Subject(
-            (x, y - LOWER + more / 2, z), BODY_SUBJECT.half_height + more / 2, _reach(positions)
-        )
+        x, y, z = positions[0, 0].tolist()
+        more = _head_above(positions, names, headroom) / 2
+        subject = Subject((x, y - LOWER + more, z), BODY_SUBJECT.half_height + more, _reach(positions))
         return Extent(subject, follows=True, legs_move=legs_move)
     low, high = low - np.array([0.10, 0.06, 0.10]), high + np.array([0.10, max(headroom, HEADROOM), 0.10])
-    low = np.minimum(low, np.array(BODY_SUBJECT.centre) - (0.35, 0.95, 0.3) + _aside(low, high))
-    x, y, z = (float(v) for v in (low + high) / 2)
+    aside = (low + high) / 2 * (1.0, 0.0, 1.0)  # for a body that does not stand at the origin
+    low = np.minimum(low, np.array(BODY_SUBJECT.centre) - (0.35, 0.95, 0.3) + aside)
+    x, y, z = ((low + high) / 2).tolist()
     wide = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     tall = max(float(high[1] - low[1]) / 2 * 1.06, 0.9)
     path = positions[:, 0, [0, 2]]
@@ -83,19 +81,13 @@ def _reach(positions: Float64) -> float:
     """Return half the width that a walker takes, metres: more than usual with arms stretched out."""
     if not np.isfinite(positions).all():
         return BODY_SUBJECT.half_width
-    ways = np.linalg.norm((positions - positions[:, :1])[..., [0, 2]], axis=2)
-    return min(max(float(ways.max()), BODY_SUBJECT.half_width), ARM_REACH)
+    away = np.linalg.norm((positions - positions[:, :1])[..., [0, 2]], axis=2)
+    return min(max(float(away.max()), BODY_SUBJECT.half_width), ARM_REACH)
 
 
 def _head_above(positions: Float64, names: tuple[str, ...], headroom: float) -> float:
     """Return metres by which a head rises above `BODY_SUBJECT` at the root at most; 0 for usual ones."""
-    if HEAD not in names or not np.isfinite(positions).all():
+    if HEAD_JOINT not in names or not np.isfinite(positions).all():
         return 0.0
-    height = float((positions[:, names.index(HEAD), 1] - positions[:, 0, 1]).max())
+    height = float((positions[:, names.index(HEAD_JOINT), 1] - positions[:, 0, 1]).max())
     return max(height + headroom - (BODY_SUBJECT.half_height - LOWER), 0.0)
-
-
-def _aside(low: Float64, high: Float64) -> Float64:
-    """Return the shift of the floor for a body that does not stand at the origin."""
-    middle = (low + high) / 2
-    return np.array([middle[0], 0.0, middle[2]])

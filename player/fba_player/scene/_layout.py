@@ -9,9 +9,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba_player.view._geometry import translation
-from fba_player.view._view import Dots, Extras, Lines, MeshShape, View
-
-Colour = tuple[float, float, float]
+from fba_player.view._view import Dots, Extras, Lines, MeshShape, View, srgb
 
 JOINT = 1e-3
 """Capsules shorter than this (m) are joints, not bones."""
@@ -44,7 +42,6 @@ def move_view(view: View, offset: Float64) -> View:
 def join_views(views: Sequence[View]) -> View:
     """Return one view of everything in all views, with the background, grid and legend of the first."""
     first = views[0]
-    extras = [view.extras for view in views if view.extras is not None]
     return replace(
         first,
         meshes=[mesh for view in views for mesh in view.meshes],
@@ -54,26 +51,31 @@ def join_views(views: Sequence[View]) -> View:
         marks=np.concatenate([view.marks for view in views]),
         blobs=np.concatenate([view.blobs for view in views]),
         ground=any(view.ground for view in views),
-        extras=replace(
-            extras[0],
-            lines=tuple(lines for one in extras for lines in one.lines),
-            dots=tuple(dots for one in extras for dots in one.dots),
-            shells=tuple(shell for one in extras for shell in one.shells),
-        )
-        if extras
-        else None,
+        extras=_join_extras([view.extras for view in views if view.extras is not None]),
+    )
+
+
+def _join_extras(extras: Sequence[Extras]) -> Extras | None:
+    if not extras:
+        return None
+    return replace(
+        extras[0],
+        lines=tuple(lines for part in extras for lines in part.lines),
+        dots=tuple(dots for part in extras for dots in part.dots),
+        shells=tuple(shell for part in extras for shell in part.shells),
     )
 
 
 class Drawing:
     """Turns a view of feature points and bones into a drawing in one colour, to lie over another figure.
 
-    colour: linear light. ink: the same colour in sRGB. Tinted shapes are cached for the renderer.
+    colour: sRGB, "#rrggbb". Tinted shapes are cached for the renderer.
     """
 
-    def __init__(self, colour: Colour, ink: Colour) -> None:
-        self._colour = colour
-        self._ink = ink
+    def __init__(self, colour: str) -> None:
+        self._colour = srgb(colour)
+        red, green, blue = (value / 255 for value in bytes.fromhex(colour[1:]))
+        self._ink = (red, green, blue, 0.95)  # of lines, as displayed
         self._shapes: dict[int, tuple[MeshShape, MeshShape]] = {}
 
     def __call__(self, view: View, eyeballs: int) -> View:
@@ -81,7 +83,7 @@ class Drawing:
         bones = view.capsules[eyeballs:]
         ends = np.stack([bones[:, 0:3], bones[:, 4:7]], axis=1)
         long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > JOINT
-        lines = Lines(ends[long], (*self._ink, 0.95), BONE_WIDTH, BONE_LIFT)
+        lines = Lines(ends[long], self._ink, BONE_WIDTH, BONE_LIFT)
         return View(
             meshes=[replace(mesh, shape=self._tint(mesh.shape)) for mesh in view.meshes],
             marks=self._paint(view.marks),
@@ -125,11 +127,10 @@ def _move_extras(extras: Extras, offset: Float64) -> Extras:
     if grid is not None:
         centre = (grid.centre[0] + float(offset[0]), grid.centre[1] + float(offset[2]))
         grid = replace(grid, height=grid.height + float(offset[1]), centre=centre)
-    lines: tuple[Lines, ...] = tuple(replace(one, ends=one.ends + by) for one in extras.lines)
     return replace(
         extras,
-        lines=lines,
-        dots=tuple(replace(one, positions=one.positions + by) for one in extras.dots),
+        lines=tuple(replace(lines, ends=np.asarray(lines.ends + by)) for lines in extras.lines),
+        dots=tuple(replace(dots, positions=dots.positions + by) for dots in extras.dots),
         shells=tuple(replace(mesh, matrix=shift @ mesh.matrix) for mesh in extras.shells),
         grid=grid,
     )

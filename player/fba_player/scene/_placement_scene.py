@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -12,14 +11,15 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
-from fba.errors import FbaWarning, LimitError, ModelError
+from fba.errors import ModelError
 from fba.face import Material, Part
 from fba.face.importers.assembly.model import metres_per_unit
+from fba.rotations import unit
 from fba.tracks import FaceTrack
-from fba_player._mesh.textures import FacePicture, load_picture
+from fba_player._figure._face_parts import part_colours, part_picture
 from fba_player.playback.timeline import Timeline
 from fba_player.scene._point_placement import MATES, PointPlacement
-from fba_player.view._geometry import first_hit, ray_through, unit_rows
+from fba_player.view._geometry import first_hit, ray_through, transform
 from fba_player.view._view import Colour, Dots, Extras, FaceMesh, FaceShape, View
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import Timed
@@ -39,7 +39,7 @@ LIGHT = (0.75, 0.55, 0.0, 0.5)
 """Light on all vertices, as in `FaceMesh.light`: shadows would hide what is to be clicked."""
 CLAY = (0.42, 0.36, 0.32)
 """Colour of surfaces without one of their own, linear light."""
-MARGIN = 1.25
+MIN_SHOWN_FACTOR = 1.25
 """The part shown is at least this many times as large as the box of the placed points."""
 
 
@@ -51,14 +51,12 @@ class PlacementScene(Timed[Timeline]):
 
     def __init__(self, placement: PointPlacement) -> None:
         self.placement = placement
-        self.timeline = Timeline(_stillness())
+        self.timeline = Timeline(
+            Animation(Fraction(25), np.zeros(1, np.int64), FaceTrack.empty(1))
+        )  # one neutral frame
         self.switches = Switches()
         self.title = Path(placement.surface.path).name
         self.has_body = False
-
-    def show(self, name: str, on: object = True) -> None:
-        """Set a switch, as of every scene; none changes this picture."""
-        self.switches.show(name, on)
 
     def view_at(self, time: float) -> View:
         """Return the head and its points; at any time the same."""
@@ -72,14 +70,6 @@ class PlacementScene(Timed[Timeline]):
         """Return the camera of a preset, fitted to the head."""
         return Camera.preset("front" if preset in (None, "body") else str(preset), self._subject, aspect)
 
-    def travel(self, time: float) -> tuple[float, float, float]:
-        """Return zeros: a head does not walk away."""
-        return 0.0, 0.0, 0.0
-
-    def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Return zeros."""
-        return 0.0, 0.0, 0.0
-
     def vertex_under(self, camera: Camera, x: float, y: float, size: tuple[int, int]) -> int | None:
         """Return the vertex, by its number in the file, of what a pixel of a picture shows, or None."""
         placement = self.placement
@@ -89,9 +79,7 @@ class PlacementScene(Timed[Timeline]):
 
     def to_world(self, points: Float64) -> Float64:
         """Return the points (N, 3) in the file's axes, in the world."""
-        matrix = self._matrix
-        world: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
-        return world
+        return transform(points, self._matrix)
 
     @cached_property
     def _matrix(self) -> Float64:
@@ -121,7 +109,7 @@ class PlacementScene(Timed[Timeline]):
         for part in self.placement.surface.parts:
             assert part.normals is not None
             positions = self.to_world(part.vertices.astype(np.float64)).astype(np.float32)
-            normals = unit_rows(part.normals @ turn.T).astype(np.float32)
+            normals = unit(part.normals @ turn.T).astype(np.float32)
             meshes.append(plain_mesh(plain_shape(part), positions, normals))
         return meshes
 
@@ -134,7 +122,7 @@ class PlacementScene(Timed[Timeline]):
         points = points[np.isfinite(points).all(axis=1)]
         if len(points) > 1:
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            half = max(float(np.ptp(points, axis=0).max()) * MARGIN / 2, HEIGHT / 2)
+            half = max(float(np.ptp(points, axis=0).max()) * MIN_SHOWN_FACTOR / 2, HEIGHT / 2)
             low, high = np.maximum(low, middle - half), np.minimum(high, middle + half)
         return fit_box(low, high)
 
@@ -154,10 +142,9 @@ class PlacementScene(Timed[Timeline]):
             )
         return tuple(group for group in groups if len(group.positions))
 
-    def _dots_of(self, known: list[str], colour: Colour, kind: str) -> Dots:
-        positions = [self.placement.position(name) for name in known]
-        points = np.array([one for one in positions if one is not None]).reshape(-1, 3)
-        return make_dots(self.to_world(points), tuple(known), colour, RADII[kind], LIFT)
+    def _dots_of(self, names: list[str], colour: Colour, kind: str) -> Dots:
+        points = np.array([self.placement.position(name) for name in names]).reshape(-1, 3)
+        return make_dots(self.to_world(points), tuple(names), colour, RADII[kind], LIFT)
 
 
 def make_dots(points: Float64, names: tuple[str, ...], colour: Colour, radius: float, lift: float) -> Dots:
@@ -185,35 +172,10 @@ def plain_mesh(shape: FaceShape, positions: Float32, normals: Float32) -> FaceMe
 
 def plain_shape(part: Part) -> FaceShape:
     """Return the shape of a part in its colours, or as clay if it has none."""
-    colours = part.colours
-    if colours is None:
-        is_plain = part.material.colour == Material().colour and part.material.texture is None
-        row = (*(CLAY if is_plain else part.material.colour), 1.0 - part.material.roughness)
-        colours = np.tile(np.array(row, dtype=np.float32), (len(part.vertices), 1))
-    picture = _picture(part) if part.texcoords is not None else None
+    is_plain = part.material.colour == Material().colour and part.material.texture is None
+    colours = part_colours(part, CLAY if is_plain else part.material.colour)
     still = np.zeros(len(part.vertices), dtype=np.float32)
     return FaceShape(
-        part.triangles, colours, still, part.texcoords, picture, two_sided=True, name=part.name, smooth=False
-    )
-
-
-def _picture(part: Part) -> FacePicture | None:
-    """Return the part's texture, or None, with an FbaWarning if it cannot be read."""
-    if part.material.texture is None:
-        return None
-    try:
-        return load_picture(part.material.texture)
-    except (OSError, ValueError, SyntaxError, LimitError) as error:
-        warnings.warn(
-            f"the texture of part {part.name!r} cannot be read ({error}): its colour is shown instead",
-            FbaWarning,
-            stacklevel=2,
-        )
-        return None
-
-
-def _stillness() -> Animation:
-    """Return one neutral frame: a window needs times."""
-    return Animation(
-        Fraction(25), np.zeros(1, np.int64), FaceTrack(np.zeros((1, 68), np.int32), np.zeros((1, 68), bool))
-    )
+        part.triangles, colours, still, part.texcoords, part_picture(part), two_sided=True, name=part.name,
+        smooth=False,
+    )  # fmt: skip

@@ -39,7 +39,7 @@ Place = int | tuple[float, float, float]
 class PointPlacement(HandEditing[dict[str, Place]]):
     """The feature points of a head while they are placed by hand.
 
-    surface: the head, with the points known so far. hidden: numbers of the parts that are not shown; clicks
+    surface: the head, with the points placed so far. hidden: numbers of the parts that are not shown; clicks
     go through them.
     """
 
@@ -73,7 +73,6 @@ class PointPlacement(HandEditing[dict[str, Place]]):
 
     @property
     def placed(self) -> Collection[str]:
-        """Names of the points that have a place."""
         return self.places
 
     @property
@@ -100,7 +99,6 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         self._change({**self.places, self.current: vertex})
 
     def remove(self) -> None:
-        """Take the current point off the head."""
         self._change({name: place for name, place in self.places.items() if name != self.current})
 
     def mirror(self) -> str | None:
@@ -135,12 +133,10 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         write_points(path, GivenPoints(points, vertices), comment)
 
     def guess(self) -> Float64 | None:
-        """Return (3,) the vertex about where the current point is, from those that have a place; None if too
-        few."""
-        known = [name for name in self.names if name in self.places]
-        if len(known) < MIN_POINTS_FOR_GUESS:
+        """Return (3,) the vertex about where the current point is; None if too few points have a place."""
+        rows = [row_of()[name] for name in self.names if name in self.places]
+        if len(rows) < MIN_POINTS_FOR_GUESS:
             return None
-        rows = [row_of()[name] for name in known]
         adult, here = neutral_points()[rows], self.positions()[rows]
         turned = here @ self.surface.upright.T
         middles = adult.mean(axis=0), turned.mean(axis=0)
@@ -166,9 +162,9 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         at = self.positions()[:, 0]
         sides = [(at[row_of()[left]] + at[row_of()[right]]) / 2 for left, right in MIRRORED.items()]
         central = [at[row_of()[name]] for name in self.names if name not in MATES]
-        known = [float(x) for x in (*sides, *central) if np.isfinite(x)]
-        if known:
-            return float(np.median(known))
+        finite = [float(x) for x in (*sides, *central) if np.isfinite(x)]
+        if finite:
+            return float(np.median(finite))
         on_surface = self.surface.vertices[self._used, 0]
         return float(on_surface.min() + on_surface.max()) / 2
 
@@ -218,13 +214,13 @@ def _places_of(given: GivenPoints) -> dict[str, Place]:
     return places
 
 
-def _asking_order(known: set[str]) -> tuple[str, ...]:
+def _asking_order(placed: set[str]) -> tuple[str, ...]:
     asked = [point for point in feature_points() if point.name not in INSIDE]
     units = list(FAPU_POINTS)
 
     def rank(number: int) -> tuple[bool, int, int]:
         point = asked[number]
         urgency = units.index(point.name) if point.name in units else 100 if point.faps else 101
-        return point.name in known, urgency, number
+        return point.name in placed, urgency, number
 
     return tuple(asked[number].name for number in sorted(range(len(asked)), key=rank))

@@ -13,8 +13,6 @@ from fba.arrays import Float32, Float64, Intp
 from fba.face import FaceModel
 from fba.face.model import point_row
 
-Indices = Intp
-
 STEPS_BETWEEN_POINTS = 8
 """Number of steps between two feature points."""
 RINGS = 3
@@ -23,17 +21,18 @@ RINGS = 3
 
 @dataclass(frozen=True, eq=False)
 class SkinLine:
-    """A line of points on triangles. kind: what it outlines. corners: (N, 3), vertices of the model. shares:
-    (N, 3), their weights."""
+    """A line of points on triangles.
+
+    kind: what it outlines. corners: (N, 3), vertices of the model. shares: (N, 3), their weights.
+    """
 
     kind: str
-    corners: Indices
+    corners: Intp
     shares: Float64
 
     def positions(self, vertices: Float32) -> Float64:
         """Return float64 (N, 3): the line's points on moved vertices (V, 3)."""
-        positions: Float64 = np.einsum("nk,nkc->nc", self.shares, vertices[self.corners].astype(np.float64))
-        return positions
+        return np.asarray(np.einsum("nk,nkc->nc", self.shares, vertices[self.corners].astype(np.float64)))
 
 
 def skin_lines(model: FaceModel) -> list[SkinLine]:
@@ -61,14 +60,13 @@ class _SkinGraph:
     """
 
     vertices: Float64
-    triangles: Indices
-    node: Indices
+    triangles: Intp
+    node: Intp
     edges: Any
     used: frozenset[int]
 
-    def line(self, through: list[int]) -> tuple[Indices, Float64] | None:
-        """Return the corners (N, 3) and weights (N, 3) of a smooth line through vertices; None if
-        unconnected."""
+    def line(self, through: list[int]) -> tuple[Intp, Float64] | None:
+        """Return corners (N, 3) and weights (N, 3) of a smooth line through vertices; None if unconnected."""
         from scipy.interpolate import CubicSpline
 
         knots = self.vertices[through]
@@ -95,9 +93,8 @@ class _SkinGraph:
             shares.append(np.array([1.0, 0.0, 0.0]))
         return np.array(corners, dtype=np.intp), np.array(shares)
 
-    def _triangles_along(self, start: int, end: int) -> Indices | None:
-        """Return the triangles (F, 3) along the shortest path between two vertices; None if no path joins
-        them."""
+    def _triangles_along(self, start: int, end: int) -> Intp | None:
+        """Return the triangles (F, 3) along the shortest path between two vertices; None without a path."""
         from scipy.sparse.csgraph import dijkstra
 
         first, last = int(self.node[start]), int(self.node[end])
@@ -137,30 +134,21 @@ def _build_skin_graph(model: FaceModel) -> _SkinGraph:
 
 
 def _nearest(point: Float64, triangles: Float64) -> tuple[int, Float64]:
-    """Return the index of the triangle (F, 3, 3) nearest to a point, and the weights (3,) of its corners
-    there."""
+    """Return the index of the triangle (F, 3, 3) nearest to a point, and the weights (3,) of its corners."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     ab, ac, ap = b - a, c - a, point - a
     d1, d2 = (ab * ap).sum(1), (ac * ap).sum(1)
     aa, bb, mixed = (ab * ab).sum(1), (ac * ac).sum(1), (ab * ac).sum(1)
     area = np.maximum(aa * bb - mixed * mixed, 1e-30)
-    v, w = (bb * d1 - mixed * d2) / area, (aa * d2 - mixed * d1) / area
-    inside = (v >= 0) & (w >= 0) & (v + w <= 1)
-    options = [np.stack([v, w], axis=1)]
-    along = np.clip(d1 / np.maximum(aa, 1e-30), 0, 1)
-    options.append(np.stack([along, np.zeros_like(along)], axis=1))
-    along = np.clip(d2 / np.maximum(bb, 1e-30), 0, 1)
-    options.append(np.stack([np.zeros_like(along), along], axis=1))
+    inner_v, inner_w = (bb * d1 - mixed * d2) / area, (aa * d2 - mixed * d1) / area
+    on_ab = np.clip(d1 / np.maximum(aa, 1e-30), 0, 1)
+    on_ac = np.clip(d2 / np.maximum(bb, 1e-30), 0, 1)
     bc = c - b
-    along = np.clip((bc * (point - b)).sum(1) / np.maximum((bc * bc).sum(1), 1e-30), 0, 1)
-    options.append(np.stack([1 - along, along], axis=1))
-    best, nearest, share = np.inf, 0, np.zeros(2)
-    for number, option in enumerate(options):
-        candidates = a + ab * option[:, :1] + ac * option[:, 1:]
-        away = np.linalg.norm(candidates - point, axis=1)
-        if number == 0:
-            away = np.where(inside, away, np.inf)
-        row = int(away.argmin())
-        if away[row] < best:
-            best, nearest, share = float(away[row]), row, option[row]
-    return nearest, np.array([1 - share[0] - share[1], share[0], share[1]])
+    on_bc = np.clip((bc * (point - b)).sum(1) / np.maximum((bc * bc).sum(1), 1e-30), 0, 1)
+    none = np.zeros(len(a))
+    v, w = np.stack([inner_v, on_ab, none, 1 - on_bc]), np.stack([inner_w, none, on_ac, on_bc])
+    away = np.linalg.norm(a + ab * v[..., None] + ac * w[..., None] - point, axis=2)
+    away[0, (inner_v < 0) | (inner_w < 0) | (inner_v + inner_w > 1)] = np.inf
+    place, nearest = np.unravel_index(int(away.argmin()), away.shape)
+    share = v[place, nearest], w[place, nearest]
+    return int(nearest), np.array([1 - share[0] - share[1], *share])

@@ -14,10 +14,9 @@ from fba_player.scene._compare_timeline import CompareTimeline
 from fba_player.scene._differences import Differences, differences
 from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
 from fba_player.scene.scene import Scene
-from fba_player.view._view import Extras, View, srgb
+from fba_player.view._view import Extras, View
 from fba_player.view.camera import PRESETS, Camera, Subject
 from fba_player.view.protocols import Timed
-from fba_player.view.switches import Switches
 
 if TYPE_CHECKING:
     from fba.animation import Animation
@@ -56,11 +55,12 @@ class CompareScene(Timed[CompareTimeline]):
         self.names = tuple(names) if names is not None else tuple(scene.title for scene in scenes)
         if len(self.names) != len(self.scenes):
             raise ValueError(f"{len(self.scenes)} scenes, but {len(self.names)} names")
+        self.switches = scenes[0].switches  # `show` sets those of all
         self.timeline = CompareTimeline([scene.timeline for scene in scenes])
         self.arrangement = arrangement
         self._yaw = 0.0
         self._stands = [np.array(scene.subject.centre) for scene in scenes]
-        self._drawings = [_drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
+        self._drawings = [Drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
         self._apart: float | None = None
         self._differences: dict[tuple[int, int], Differences] = {}
 
@@ -94,11 +94,6 @@ class CompareScene(Timed[CompareTimeline]):
     def title(self) -> str:
         """The scenes' names."""
         return " | ".join(name for name in self.names if name)
-
-    @property
-    def switches(self) -> Switches:
-        """The switches of all scenes; set by `show`."""
-        return self.scenes[0].switches
 
     def show(self, name: str, on: object = True) -> None:
         """Set a switch of all scenes; ValueError for an unknown name or value."""
@@ -138,11 +133,11 @@ class CompareScene(Timed[CompareTimeline]):
             self._apart = None
         elif preset is None:
             subjects = [scene.gesture_subject or scene.subject for scene in self.scenes]
-            self._apart = max(SHOULDER_HALF_WIDTH * 1.3, max(one.half_width for one in upper) * 0.8)
+            self._apart = max(SHOULDER_HALF_WIDTH * 1.3, max(subject.half_width for subject in upper) * 0.8)
         else:
             subjects = [scene.face_subject for scene in self.scenes]
             self._apart = SHOULDER_HALF_WIDTH
-        self._stands = [np.array(one.centre) for one in subjects]
+        self._stands = [np.array(subject.centre) for subject in subjects]
         return camera.fit(self._all(subjects), aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
@@ -164,7 +159,12 @@ class CompareScene(Timed[CompareTimeline]):
             shift = self._shift(number) + travelled - np.array(scene.travel(own_time))
             view = move_view(scene.view_at(own_time), shift)
             if self.names[number] and len(self.scenes) > 1:
-                view = _add_caption(view, self.names[number], self._caption_position(number) + travelled)
+                head = scene.face_subject
+                x, y, z = head.centre
+                place = np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number)
+                extras = view.extras or Extras()
+                caption = make_caption(self.names[number], place + travelled)
+                view = replace(view, extras=replace(extras, dots=(*extras.dots, caption)))
             views.append(view)
         return join_views(views)
 
@@ -184,18 +184,17 @@ class CompareScene(Timed[CompareTimeline]):
         return self._differences[key]
 
     def _over(self, times: list[float]) -> View:
-        base = self.scenes[0].view_at(times[0])
+        views = [self.scenes[0].view_at(times[0])]
         travelled = np.array(self.scenes[0].travel(times[0]))
-        views = [base]
-        for number, (scene, own_time) in enumerate(list(zip(self.scenes, times, strict=True))[1:], 1):
+        for number in range(1, len(self.scenes)):
+            scene, own_time = self.scenes[number], times[number]
             before, scene.view = scene.view, "points"
             try:
                 drawn = self._drawings[number - 1](scene.view_at(own_time), len(scene.figure.eyeballs))
             finally:
                 scene.view = before
-            views.append(
-                move_view(drawn, self._height(number) + travelled - np.array(scene.travel(own_time)))
-            )
+            shift = self._height(number) + travelled - np.array(scene.travel(own_time))
+            views.append(move_view(drawn, shift))
         return join_views(views)
 
     def _right(self) -> Float64:
@@ -220,30 +219,25 @@ class CompareScene(Timed[CompareTimeline]):
             return self._apart
         if scene.has_body:
             return max(scene.subject.half_width, SHOULDER_HALF_WIDTH)
-        heads = max(one.subject.half_width for one in self.scenes if not one.has_body)
+        heads = max(scene.subject.half_width for scene in self.scenes if not scene.has_body)
         return max(heads, SHOULDER_HALF_WIDTH) if self.has_body else heads
 
     def _height(self, number: int) -> Float64:
         """Return (3,): the shift that brings a head alone to the height of heads on bodies."""
         scene = self.scenes[number]
-        with_body = next((one for one in self.scenes if one.has_body), None)
+        with_body = next((other for other in self.scenes if other.has_body), None)
         if scene.has_body or with_body is None:
             return np.zeros(3)
         return np.subtract(with_body.face_subject.centre, scene.face_subject.centre)
 
-    def _caption_position(self, number: int) -> Float64:
-        head = self.scenes[number].face_subject
-        x, y, z = head.centre
-        return np.asarray(np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number))
-
     def _all(self, subjects: list[Subject]) -> Subject:
         """Return one subject around all subjects in their places."""
         right = self._right()
-        centres = [np.array(one.centre) + self._shift(n) for n, one in enumerate(subjects)]
+        centres = [np.array(subject.centre) + self._shift(n) for n, subject in enumerate(subjects)]
         along = [float(centre @ right) for centre in centres]
         widths = [
-            max(one.half_width, (self._apart or 0.0) * 0.7, SHOULDER_HALF_WIDTH if self.has_body else 0.0)
-            for one in subjects
+            max(subject.half_width, (self._apart or 0.0) * 0.7, SHOULDER_HALF_WIDTH if self.has_body else 0.0)
+            for subject in subjects
         ]
         low = min(a - width for a, width in zip(along, widths, strict=True))
         high = max(a + width for a, width in zip(along, widths, strict=True))
@@ -254,13 +248,3 @@ class CompareScene(Timed[CompareTimeline]):
         middle = middle + right * ((low + high) / 2 - float(middle @ right))
         centre = (float(middle[0]), (bottom + top) / 2, float(middle[2]))
         return Subject(centre, (top - bottom) / 2, (high - low) / 2)
-
-
-def _drawing(colour: str) -> Drawing:
-    red, green, blue = (int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5))
-    return Drawing(srgb(colour), (red, green, blue))
-
-
-def _add_caption(view: View, text: str, position: Float64) -> View:
-    extras = view.extras or Extras()
-    return replace(view, extras=replace(extras, dots=(*extras.dots, make_caption(text, position))))

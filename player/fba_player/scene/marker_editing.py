@@ -198,8 +198,7 @@ class MarkerEditing(HandEditing[MarkerMapping]):
         return made
 
     def _steady_markers(self) -> SteadyMarkers:
-        """Return the markers without the head's motion, which depends only on what is mapped and what is
-        fixed."""
+        """Return the markers without the head's motion, which depends only on what is mapped and fixed."""
         key = (tuple(self.mapping.markers), self.mapping.fixed)
         if self._steady is None or self._steady[0] != key:
             self._steady = (key, steady(self.motion, self.mapping, self.neutral))
@@ -210,7 +209,7 @@ class MarkerEditing(HandEditing[MarkerMapping]):
         if self.current not in centres:
             return None
         chosen = centres if self.mapping.assignment == "exclusive" else {self.current: centres[self.current]}
-        found = find_influences(self.head, chosen.values())
+        influences = find_influences(self.head, chosen.values())
         if self.mapping.assignment == "exclusive":
-            found = give_to_nearest(found)
-        return found[list(chosen).index(self.current)]
+            influences = give_to_nearest(influences)
+        return influences[list(chosen).index(self.current)]

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
 from fba.mesh import vertex_normals
+from fba.rotations import unit
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._mesh.textures import linear_light
 from fba_player.playback.timeline import CaptureTimes
-from fba_player.scene._fap_heatmap import GLOSS, SHADES, heat_colours
+from fba_player.scene._fap_heatmap import GLOSS, heat_colours, heat_legend, plain_colours
 from fba_player.scene._placement_scene import fit_box, make_dots, plain_mesh, plain_shape
 from fba_player.scene.marker_editing import MarkerEditing
-from fba_player.view._geometry import first_hit, ray_through, rotation_vector, translation, unit_rows
+from fba_player.view._geometry import first_hit, project, ray_through, rotation_vector, transform, translation
 from fba_player.view._view import Colour, Dots, Extras, Eye, FaceMesh, FaceShape, Legend, Lines, View
 from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import Timed
@@ -26,9 +26,9 @@ MOVING: Colour = (0.95, 0.62, 0.25, 1.0)
 FIXED: Colour = (0.62, 0.70, 0.80, 1.0)
 FREE: Colour = (0.93, 0.94, 0.96, 0.55)
 CURRENT: Colour = (0.25, 0.75, 1.0, 1.0)
-LINE: Colour = (0.25, 0.75, 1.0, 0.55)
+LINE_COLOUR: Colour = (0.25, 0.75, 1.0, 0.55)
 """Moving, fixed and unmapped markers, the current one, and the line from it to its vertex."""
-RADIUS = 4.2
+MARKER_RADIUS = 4.2
 CENTRE_RADIUS = 2.6
 CURRENT_RADIUS = 6.0
 """Radii of dots, pixels in a picture 720 high."""
@@ -66,33 +66,24 @@ class MarkersScene(Timed[CaptureTimes]):
         self.shows_cloud = where != "none"
         self.editing.beside = where == "beside"
 
-    def show(self, name: str, on: object = True) -> None:
-        """Set a switch, as of every scene; of these, only the background changes this picture."""
-        self.switches.show(name, on)
-
     def view_at(self, time: float) -> View:
         """Return the head and the cloud at a time in seconds."""
         frame, after, share = self.timeline.position(time)
         vertices, pose = self._moved(frame, after, share)
         faces, eyes = self._figure_meshes(vertices, pose) if self._figure else self._plain(vertices, pose)
         background = (0.5, 0.5, 0.5) if self.switches["background"] == "grey" else None
-        cloud = self._cloud(frame, after, share)
-        dots, lines = self._annotations(cloud, vertices, pose)
-        return View(
-            faces=faces, eyes=eyes, background=background,
-            extras=Extras(dots=dots, lines=lines, legend=self._legend),
-        )  # fmt: skip
+        dots, lines = self._annotations(self._cloud(frame, after, share), vertices, pose)
+        extras = Extras(dots=dots, lines=lines, legend=self._legend)
+        return View(faces=faces, eyes=eyes, background=background, extras=extras)
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """Return the camera of a preset, fitted to the head, and to the cloud if it is beside it."""
         return Camera.preset("front" if preset in (None, "body") else str(preset), self._subject, aspect)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Return how far the head has gone, metres; zeros for one that stays about where it is."""
+        """Return how far the head has gone, metres; zeros if it stays about where it is."""
         made = self.editing.performance
-        if made is None:
-            return 0.0, 0.0, 0.0
-        if float(np.ptp(made.shift, axis=0).max()) * made.head.metres < MIN_FOLLOWED_TRAVEL:
+        if made is None or np.ptp(made.shift, axis=0).max() * made.head.metres < MIN_FOLLOWED_TRAVEL:
             return 0.0, 0.0, 0.0
         frame, after, share = self.timeline.position(time)
         middle = made.head.vertices[made.head.face].mean(axis=0)
@@ -100,17 +91,13 @@ class MarkersScene(Timed[CaptureTimes]):
         x, y, z = ((pose[:3, :3] @ middle + pose[:3, 3] - middle) * made.head.metres).tolist()
         return x, y, z
 
-    def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Return the same as `travel`."""
-        return self.travel(time)
-
     def vertex_under(
         self, camera: Camera, x: float, y: float, size: tuple[int, int], time: float
     ) -> int | None:
         """Return the vertex of the head that is nearest to what a pixel of a picture shows, or None."""
         vertices, pose = self._moved(*self.timeline.position(time))
         triangles = self.editing.head.triangles
-        corners = self.to_world(_posed(vertices, pose))[triangles]
+        corners = self.to_world(transform(vertices, pose))[triangles]
         hit = first_hit(*ray_through(camera, x, y, size), corners)
         return None if hit is None else int(triangles[hit[0], int(hit[1].argmax())])
 
@@ -122,33 +109,30 @@ class MarkersScene(Timed[CaptureTimes]):
         vertices, pose = self._moved(frame, after, share)
         names = list(self.editing.motion.names)
         places = [self._cloud(frame, after, share)] if self.shows_cloud else []
-        found = names if self.shows_cloud else []
+        choices = names if self.shows_cloud else []
         if self.editing.beside:
             centres = {name: one.vertex or 0 for name, one in self.editing.mapping.centres.items()}
-            found = [*found, *centres]
-            places.append(self.to_world(_posed(vertices[list(centres.values())], pose)))
-        pixels = _pixels(np.concatenate(places), camera, size) if places else np.zeros((0, 2))
+            choices = [*choices, *centres]
+            places.append(self.to_world(transform(vertices[list(centres.values())], pose)))
+        pixels = (
+            project(np.concatenate(places), camera.clip_matrix(size), size)[0] if places else np.zeros((0, 2))
+        )
         away = np.linalg.norm(pixels - (x, y), axis=1)
         away[np.isnan(away)] = np.inf
-        reach = MAX_CLICK_DISTANCE * size[1] / 720
-        if not len(away) or away.min() > reach:
-            return None
-        return found[int(away.argmin())]
+        near = away.min(initial=np.inf) <= MAX_CLICK_DISTANCE * size[1] / 720
+        return choices[int(away.argmin())] if near else None
 
     def to_world(self, points: Float64) -> Float64:
         """Return the points (..., 3) of the head in the world."""
-        world: Float64 = (points - self._middle) * self.editing.head.metres
-        return world
+        return np.asarray((points - self._middle) * self.editing.head.metres)
 
     @cached_property
     def _middle(self) -> Float64:
-        """The point (3,) at the world's origin, in the head's unit: a face model's origin, else the head's
-        middle."""
+        """The point (3,) at the world's origin, in the head's unit: a model's origin, else the middle."""
         if self.editing.head.model is not None:
             return np.zeros(3)
         used = self.editing.head.vertices[np.unique(self.editing.head.triangles)]
-        middle: Float64 = (used.min(axis=0) + used.max(axis=0)) / 2
-        return middle
+        return np.asarray((used.min(axis=0) + used.max(axis=0)) / 2)
 
     @cached_property
     def _figure(self) -> FaceFigure | None:
@@ -160,9 +144,9 @@ class MarkersScene(Timed[CaptureTimes]):
         """Lowest and highest corner, (3,), of the part of the head that markers are on, metres."""
         editing = self.editing
         places = self.to_world(editing.head.vertices[np.unique(editing.head.triangles)])
-        known = editing.head.points[np.isfinite(editing.head.points).all(axis=1)]
-        if len(known) > 1:
-            low, high = self.to_world(known)[:, 1].min(), self.to_world(known)[:, 1].max()
+        points = editing.head.points[np.isfinite(editing.head.points).all(axis=1)]
+        if len(points) > 1:
+            low, high = self.to_world(points)[:, 1].min(), self.to_world(points)[:, 1].max()
             near = (places[:, 1] > low) & (places[:, 1] < high)
             places = places[near] if near.any() else places
         return places.min(axis=0), places.max(axis=0)
@@ -197,8 +181,7 @@ class MarkersScene(Timed[CaptureTimes]):
         """Return float64 (N, 3): what is added to the normals of the head at rest."""
         skin = self.editing.head.skin
         now = vertex_normals(vertices[self._representatives], skin.triangles)
-        changes: Float64 = (now - self._rest_normals).astype(np.float64)[skin.number]
-        return changes
+        return np.asarray((now - self._rest_normals).astype(np.float64)[skin.number])
 
     def _figure_meshes(self, vertices: Float64, pose: Float64) -> tuple[list[FaceMesh], list[Eye]]:
         figure = self._figure
@@ -213,7 +196,7 @@ class MarkersScene(Timed[CaptureTimes]):
             rows = figure.rows(name)
             normals = figure.model.part(name).normals
             assert normals is not None
-            bent = unit_rows(normals + changes[rows]).astype(np.float32)
+            bent = unit(normals + changes[rows]).astype(np.float32)
             meshes.append(FaceMesh(shape, positions[rows], bent, light[rows], place, axis, centre))
         still = np.zeros(68, dtype=np.float32)
         eyes = [
@@ -228,12 +211,12 @@ class MarkersScene(Timed[CaptureTimes]):
 
     def _plain(self, vertices: Float64, pose: Float64) -> tuple[list[FaceMesh], list[Eye]]:
         head = self.editing.head
-        world = self.to_world(_posed(vertices, pose)).astype(np.float32)
+        world = self.to_world(transform(vertices, pose)).astype(np.float32)
         changes = self._normal_changes(vertices)
         meshes = []
         for part, rows, shape in zip(head.parts, head.rows, self._shapes(self._plain_shapes), strict=True):
             assert part.normals is not None
-            normals = unit_rows((part.normals + changes[rows]) @ pose[:3, :3].T).astype(np.float32)
+            normals = unit((part.normals + changes[rows]) @ pose[:3, :3].T).astype(np.float32)
             meshes.append(plain_mesh(shape, world[rows], normals))
         return meshes, []
 
@@ -253,17 +236,12 @@ class MarkersScene(Timed[CaptureTimes]):
         on_skin = np.zeros(len(head.skin))
         on_skin[editing.influence.vertices] = editing.influence.shares
         shares = head.followers @ on_skin
-        rows: dict[str, Any] = {part.name: own for part, own in zip(head.parts, head.rows, strict=True)}
+        rows = dict(zip((part.name for part in head.parts), head.rows, strict=True))
         painted = []
         for shape in plain:
             colours = np.full((len(rows[shape.name]), 4), GLOSS, dtype=np.float32)
             colours[:, :3] = linear_light(heat_colours(np.clip(shares[rows[shape.name]], 0.0, 1.0)))
-            painted.append(
-                replace(
-                    shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None,
-                    coarser=None,
-                )
-            )  # fmt: skip
+            painted.append(plain_colours(shape, colours))
         return painted
 
     @property
@@ -271,13 +249,11 @@ class MarkersScene(Timed[CaptureTimes]):
         editing = self.editing
         if not editing.shows_weights or editing.influence is None:
             return None
-        stops = tuple(tuple(float(v) for v in row) for row in heat_colours(np.linspace(0, 1, SHADES)))
         count = int((editing.influence.shares > 0).sum())
-        return Legend(editing.current, f"share of its way, {count} vertices", 1.0, stops)  # type: ignore[arg-type]
+        return heat_legend(editing.current, f"share of its way, {count} vertices", 1.0)
 
     def _cloud(self, frame: int, after: int, share: float) -> Float64:
-        """Return float64 (M, 3): the markers in the world, beside the head or over it; NaN where one is not
-        seen."""
+        """Return float64 (M, 3): the markers in the world, beside or over the head; NaN for unseen ones."""
         made = self.editing.performance
         positions = self.editing.laid_out if made is None else made.cloud
         here = positions[frame] if share == 0 else positions[frame] * (1 - share) + positions[after] * share
@@ -299,16 +275,16 @@ class MarkersScene(Timed[CaptureTimes]):
                 (MOVING, [name for name in at if name in markers and not markers[name].fixed]),
             ):
                 places = np.array([at[name] for name in chosen if name != source]).reshape(-1, 3)
-                groups.append((places, colour, RADIUS, ""))
-        world = self.to_world(_posed(vertices, pose))
+                groups.append((places, colour, MARKER_RADIUS, ""))
+        world = self.to_world(transform(vertices, pose))
         lines: tuple[Lines, ...] = ()
         if self.editing.beside:
             for colour, fixed in ((FIXED, True), (MOVING, False)):
-                own = [
-                    one.vertex for name, one in editing.mapping.centres.items()
-                    if one.fixed == fixed and name != current
+                vertices_of = [
+                    marker.vertex for name, marker in editing.mapping.centres.items()
+                    if marker.fixed == fixed and name != current
                 ]  # fmt: skip
-                groups.append((world[np.array(own, dtype=np.intp)], colour, CENTRE_RADIUS, ""))
+                groups.append((world[np.array(vertices_of, dtype=np.intp)], colour, CENTRE_RADIUS, ""))
         centre = editing.mapping.centres.get(current)
         if self.shows_cloud and source in at:
             groups.append((at[source][None], CURRENT, CURRENT_RADIUS, source))
@@ -316,7 +292,7 @@ class MarkersScene(Timed[CaptureTimes]):
             groups.append((world[centre.vertex][None], CURRENT, CURRENT_RADIUS - 1, ""))
             if self.shows_cloud and source in at:
                 ends = np.stack([at[source], world[centre.vertex]])[None]
-                lines = (Lines(ends.astype(np.float32), LINE, 1.2, LIFT),)
+                lines = (Lines(ends.astype(np.float32), LINE_COLOUR, 1.2, LIFT),)
         dots = tuple(
             make_dots(points, (name,) * len(points), colour, radius, LIFT)
             for points, colour, radius, name in groups
@@ -334,17 +310,3 @@ class MarkersScene(Timed[CaptureTimes]):
         x, y, z = subject.centre
         aside = float(self._beside[0]) / 2
         return replace(subject, centre=(x + aside, y, z), half_width=subject.half_width - ROOM_FACTOR * aside)
-
-
-def _posed(points: Float64, pose: Float64) -> Float64:
-    posed: Float64 = points @ pose[:3, :3].T + pose[:3, 3]
-    return posed
-
-
-def _pixels(points: Float64, camera: Camera, size: tuple[int, int]) -> Float64:
-    """Return float64 (N, 2): pixels from the upper left corner of a picture; NaN behind the camera."""
-    matrix = camera.projection_matrix(size[0] / size[1]) @ camera.view_matrix()
-    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
-    clip[clip[:, 3] < 1e-6] = np.nan
-    pixels: Float64 = (clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5) * size
-    return pixels

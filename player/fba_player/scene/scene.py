@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,10 +69,6 @@ class Scene(Timed[Timeline]):
         self.timeline = timeline or Timeline(animation, self.model)
         self.switches = Switches()
         self.view = view
-        self._figure: FaceFigure | None = None
-        self._point_view: PointView | None = None
-        self._person: Person | None = None
-        self._options: DisplayOptions | None = None
         self._extent: Extent | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
@@ -95,35 +92,36 @@ class Scene(Timed[Timeline]):
             raise ValueError(f"no view {name!r}; there are {', '.join(LOOKS)}")
         self._view = name
 
-    def show(self, name: str, on: object = True) -> None:
-        """Set a switch: True or False, a choice's word, or a FAP by name or number; see `SWITCHES`.
-
-        Raises ValueError for a switch that does not exist or a value that it cannot have.
-        """
-        self.switches.show(name, on)
-
     @property
     def title(self) -> str:
         """The animation's name."""
         return self.animation.name
 
-    @property
+    @cached_property
     def figure(self) -> FaceFigure:
         """The face that is shown; built on first use."""
-        if self._figure is None:
-            from fba_player._figure.face import build_figure
+        from fba_player._figure.face import build_figure
 
-            self._figure = build_figure(self.model)
-        return self._figure
+        return build_figure(self.model)
 
-    @property
+    @cached_property
     def person(self) -> Person:
         """The body that is shown, with the face on it; built on first use; only if there is a body."""
-        if self._person is None:
-            from fba_player._figure.person import build_person
+        from fba_player._figure.person import build_person
 
-            self._person = build_person(self._body, self.figure)
-        return self._person
+        return build_person(self._body, self.figure)
+
+    @cached_property
+    def _point_view(self) -> PointView:
+        from fba_player.scene._feature_points_view import PointView
+
+        return PointView(self.figure)
+
+    @cached_property
+    def _options(self) -> DisplayOptions:
+        from fba_player.scene._display_options import DisplayOptions
+
+        return DisplayOptions(self.figure, self._bones if self.has_body else None)
 
     @property
     def has_body(self) -> bool:
@@ -154,8 +152,8 @@ class Scene(Timed[Timeline]):
             return face
         faps, joints = self._pose_at(time)
         matrix = self._face_matrix(joints) @ self.figure.pose(faps).turn
-        x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3]
-        return Subject((float(x), float(y), float(z)), face.half_height, face.half_width)
+        x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3].tolist()
+        return Subject((x, y, z), face.half_height, face.half_width)
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """Return a camera that has everything in view, for the named preset or for what the content suggests.
@@ -169,11 +167,7 @@ class Scene(Timed[Timeline]):
         return Camera.preset(preset, subject, aspect)
 
     def view_for(self, faps: Float32, baps: Float64) -> View:
-        """Return the view for FAPs (68,) as `fba.face.resolve` gives them and BAPs (296,), not the
-        animation's.
-
-        baps are ignored if the animation has no body.
-        """
+        """Return the view for FAPs (68,), as `fba.face.resolve` gives them, and BAPs (296,), if any."""
         return self._make_view(faps, self._poser.pose(baps) if self.has_body else None)
 
     def still(self, faps: Float32) -> View:
@@ -191,10 +185,8 @@ class Scene(Timed[Timeline]):
         view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
         if not self.switches.changed:
             return view
-        from fba_player.scene._display_options import DisplayOptions, Posture
+        from fba_player.scene._display_options import Posture
 
-        if self._options is None:
-            self._options = DisplayOptions(self.figure, self._bones if self.has_body else None)
         return self._options.apply(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
 
     def _person_or_head(self, faps: Float32, joints: Float64 | None) -> View:
@@ -212,10 +204,6 @@ class Scene(Timed[Timeline]):
 
     def _points(self, faps: Float32, joints: Float64 | None) -> View:
         """Return the view of feature points and bones."""
-        if self._point_view is None:
-            from fba_player.scene._feature_points_view import PointView
-
-            self._point_view = PointView(self.figure)
         points, matrix = self._point_view, self._face_matrix(joints)
         view = View(
             meshes=points.meshes(faps, matrix),
@@ -229,8 +217,7 @@ class Scene(Timed[Timeline]):
         return replace(view, capsules=capsules, blobs=self._bones.shadows(joints), ground=True)
 
     def travel(self, time: float) -> tuple[float, float, float]:
-        """Return the offset (x, y, z) of a following camera at a time, metres; zeros if it does not
-        follow."""
+        """Return the offset (x, y, z) of a following camera, metres; zeros if it does not follow."""
         if not self.has_body or not self._sampled_extent().follows:
             return (0.0, 0.0, 0.0)
         joints = self._pose_at(time)[1]
@@ -239,8 +226,7 @@ class Scene(Timed[Timeline]):
         return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Return the displacement (x, y, z) of the head from the start to a time, metres; zeros without a
-        body."""
+        """Return the displacement (x, y, z) of the head from the start, metres; zeros without a body."""
         x, y, z = np.subtract(self._face_at(time).centre, self.face_subject.centre).tolist()
         return (x, y, z)
 

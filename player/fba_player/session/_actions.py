@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
-from fba_player.playback.transport import Transport
 from fba_player.session._session import Session
 
 SOUND_SHIFT = 0.02
@@ -54,62 +54,50 @@ def _mute(session: Session) -> None:
     session.say("sound off" if session.audio.muted else "sound on", about="mute")
 
 
-def _shift_sound(seconds: float) -> Callable[[Session], None]:
-    def shift(session: Session) -> None:
-        if session.sound is None:
-            session.say("there is no sound", "warning")
-            return
-        session.shift_sound(seconds)
-        now = session.sound_offset
-        way = f"{abs(now):.2f} s {'later' if now > 0 else 'earlier'}" if now else "with the first frame"
-        session.say(f"sound {way}", about="sound")
-
-    return shift
+def _shift_sound(session: Session, seconds: float) -> None:
+    if session.sound is None:
+        session.say("there is no sound", "warning")
+        return
+    session.shift_sound(seconds)
+    now = session.sound_offset
+    begins = f"{abs(now):.2f} s {'later' if now > 0 else 'earlier'}" if now else "with the first frame"
+    session.say(f"sound {begins}", about="sound")
 
 
 def _bare(session: Session) -> None:
     session.bare = not session.bare
 
 
-def _on_transport(action: Callable[[Transport], None]) -> Callable[[Session], None]:
-    return lambda session: action(session.transport)
-
-
-def _step(frames: int) -> Callable[[Session], None]:
-    return lambda session: session.transport.step(frames)
-
-
-def _request(what: str) -> Callable[[Session], None]:
-    return lambda session: session.request(what)
-
-
 _ACTIONS: dict[str, Callable[[Session], None]] = {
-    "toggle": _on_transport(Transport.toggle),
-    "stop": _on_transport(Transport.stop),
-    "back": _step(-1),
-    "on": _step(1),
-    "back10": _step(-10),
-    "on10": _step(10),
-    "first": _on_transport(Transport.first),
-    "last": _on_transport(Transport.last),
+    "toggle": lambda session: session.transport.toggle(),
+    "stop": lambda session: session.transport.stop(),
+    "back": lambda session: session.transport.step(-1),
+    "on": lambda session: session.transport.step(1),
+    "back10": lambda session: session.transport.step(-10),
+    "on10": lambda session: session.transport.step(10),
+    "first": lambda session: session.transport.first(),
+    "last": lambda session: session.transport.last(),
     "mark_in": _mark_in,
     "mark_out": _mark_out,
-    "clear_marks": _on_transport(Transport.clear_marks),
-    "loop": _on_transport(Transport.toggle_loop),
-    "faster": _on_transport(Transport.faster),
-    "slower": _on_transport(Transport.slower),
+    "clear_marks": lambda session: session.transport.clear_marks(),
+    "loop": lambda session: session.transport.toggle_loop(),
+    "faster": lambda session: session.transport.faster(),
+    "slower": lambda session: session.transport.slower(),
     "normal_speed": lambda session: session.transport.set_speed(1.0),
     "interpolate": _interpolate,
     "reset_view": lambda session: session.viewpoint.reset(),
     "follow": _follow,
     "points": Session.toggle_view,
     "mute": _mute,
-    "sound_earlier": _shift_sound(-SOUND_SHIFT),
-    "sound_later": _shift_sound(SOUND_SHIFT),
+    "sound_earlier": partial(_shift_sound, seconds=-SOUND_SHIFT),
+    "sound_later": partial(_shift_sound, seconds=SOUND_SHIFT),
     "bare": _bare,
     "close": Session.leave,
     "escape": Session.escape,
-    **{name: _request(name) for name in ("screenshot", "transparent", "record", "fullscreen")},
+    **{
+        name: partial(Session.request, what=name)
+        for name in ("screenshot", "transparent", "record", "fullscreen")
+    },
 }
 _ACTIONS_WITH_NAME: dict[str, Callable[[Session, str], None]] = {
     "camera": lambda session, name: session.viewpoint.preset(name),

@@ -65,7 +65,6 @@ class Viewpoint:
 
     @property
     def gliding(self) -> bool:
-        """Whether it is gliding to another view."""
         return self._clock() < max(self._until, self._shift_until)
 
     @property
@@ -74,8 +73,7 @@ class Viewpoint:
         return self._first_view if isinstance(self._first_view, Camera) else self.fit(self._first_view)
 
     def fit(self, preset: str | None) -> Camera:
-        """Return the camera of a preset, fitted above what is covered; None: the view that suits the
-        content."""
+        """Return the camera of a preset, or, for None, of what suits the content, above what is covered."""
         free = 1.0 - min(max(self.covered, 0.0), 0.5)
         camera = self.scene.camera(preset, self.aspect / free)
         camera = camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
@@ -93,7 +91,6 @@ class Viewpoint:
         self._fitted_to = (self.aspect, self._fitted_to[1])
 
     def glide(self, camera: Camera) -> None:
-        """Glide to another view."""
         self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE_SECONDS
 
     def preset(self, name: str) -> None:
@@ -111,7 +108,6 @@ class Viewpoint:
         self._shift_until = self._clock() + GLIDE_SECONDS if smoothly else -math.inf
 
     def reset(self) -> None:
-        """Glide back to the first view."""
         self.follow = True
         self.glide(self.beginning)
         self._preset = self._first_view if not isinstance(self._first_view, Camera) else ""
@@ -125,9 +121,8 @@ class Viewpoint:
         shift, further = self._shift_now()
         if (shift, further) == NOT_SHIFTED:
             return self.camera_without_panels(time)
-        up = (
-            -min(max(self.covered, 0.0), 0.5) / 2 * (1 - 1 / further)
-        )  # the middle above the bar stays where it is
+        # The middle above the bar stays where it is.
+        up = -min(max(self.covered, 0.0), 0.5) / 2 * (1 - 1 / further)
         return self.camera_without_panels(time).zoom(further).pan(-shift * self.aspect, up)
 
     def toggle_follow(self, time: float) -> None:
@@ -136,17 +131,16 @@ class Viewpoint:
         self.follow = not self.follow
 
     def _progress(self, until: float) -> float:
-        """Return the progress, 0 to 1, of a glide that ends at a reading of the clock; it starts and ends
-        slowly."""
+        """Return the progress, 0 to 1, of a glide that ends at a reading of the clock, slow at both ends."""
         return float(smoothstep(1.0 - (until - self._clock()) / GLIDE_SECONDS))
 
     def _shift_now(self) -> tuple[float, float]:
         share = self._progress(self._shift_until)
-        a, b = (
-            before + (after - before) * share
-            for before, after in zip(self._shift_before, self._shift, strict=True)
-        )
-        return (a, b) if share < 1.0 else self._shift
+        if share >= 1.0:
+            return self._shift
+        pairs = zip(self._shift_before, self._shift, strict=True)
+        shift, factor = (before + (after - before) * share for before, after in pairs)
+        return shift, factor
 
     def _shift_between(self, left: float, right: float) -> tuple[float, float]:
         """Return the shift of the middle as a share of the width, and factor on the camera's distance."""
@@ -155,14 +149,13 @@ class Viewpoint:
             return (left - right) / 2, 1.0
         aspect = self.aspect / (1.0 - min(max(self.covered, 0.0), 0.5))
         narrow = self.scene.camera(self._preset, aspect * free).distance
-        full = self.scene.camera(
-            self._preset, aspect
-        ).distance  # last: a scene arranges its figures for the camera asked for last
+        # Last: a scene arranges its figures for the camera asked for last.
+        full = self.scene.camera(self._preset, aspect).distance
         return (left - right) / 2, max(narrow / full, 1.0)
 
-    def _follow_travel(self, camera: Camera, time: float, way: float) -> Camera:
+    def _follow_travel(self, camera: Camera, time: float, direction: float) -> Camera:
         travel = self.scene.travel(time)
         if not any(travel):
             return camera
-        x, y, z = (a + way * b for a, b in zip(camera.target, travel, strict=True))
+        x, y, z = (a + direction * b for a, b in zip(camera.target, travel, strict=True))
         return replace(camera, target=(x, y, z))

@@ -19,9 +19,9 @@ from fba_player.export.recorder import Recorder
 from fba_player.gl._framebuffer import Target
 from fba_player.gl.renderer import Renderer
 from fba_player.session._session import Session
-from fba_player.sound._recorded_sound import FilmSound
+from fba_player.sound.soundtrack import FilmSound
 
-RATE = 30
+FILM_RATE = 30
 """Frames per second of a film of the window."""
 SAMPLES = 4
 """Samples per pixel of a screenshot, which need not be fast."""
@@ -44,7 +44,6 @@ class Captures:
 
     @property
     def recording(self) -> bool:
-        """Whether a film is being recorded."""
         return self._recorder is not None
 
     def screenshot(self, pixels: UInt8, *, transparent: bool = False) -> Path | None:
@@ -59,14 +58,13 @@ class Captures:
         return path
 
     def toggle_recording(self) -> None:
-        """Start recording a film, or finish it."""
         if self._recorder is not None:
             self._finish()
             return
         path = self._unused_path("-film", ".mp4")
         sound = self._open_sound()
         try:
-            self._recorder = Recorder(path, self.session.size, rate=RATE, audio=sound)
+            self._recorder = Recorder(path, self.session.size, rate=FILM_RATE, audio=sound)
         except (OSError, FbaError, ValueError) as error:
             if sound is not None:
                 sound.close()
@@ -121,8 +119,7 @@ class Captures:
             self.session.say(f"Recording stopped: {error}", "error", 8.0)
 
     def _open_sound(self) -> FilmSound | None:
-        """Return the sound for a new film; None without sound, or, with a notice, if the file cannot be
-        used."""
+        """Return the sound for a new film; None without sound, or, with a notice, if it cannot be used."""
         session = self.session
         if session.sound is None:
             return None
@@ -174,9 +171,9 @@ def draw_screenshot(
         view, camera = session.view(time), session.viewpoint.camera_without_panels(time)
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)] if transparent else [view]
         pictures = []
-        for one in views:
+        for shown in views:
             target.begin()
-            within = renderer.draw(one, camera, session.size)
+            within = renderer.draw(shown, camera, session.size)
             pictures.append(read_pixels(target.finish(within=within), session.size))
     finally:
         scene.show("background", before)

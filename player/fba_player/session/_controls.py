@@ -64,7 +64,6 @@ class Controls:
             self._held = "orbit" if button == "left" else "pan"
 
     def move(self, x: float, y: float) -> None:
-        """Handle a move of the mouse."""
         right, down = x - self._last[0], y - self._last[1]
         if not self._dragged and page_of(self.session) is not None:
             self._dragged = math.hypot(right, down) > CLICK_DISTANCE * self.session.scale

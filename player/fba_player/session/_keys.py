@@ -83,7 +83,8 @@ def tables() -> str:
             group = row.group
             lines += _table_head(group.lower())
         lines.append(f"| {', '.join(_to_markdown(key) for key in row.shown.split(', '))} | {row.does} |")
-    lines += _table_head("switch") + [f"| {one.key} | {one.label} |" for one in SWITCHES.values() if one.key]
+    switches = [switch for switch in SWITCHES.values() if switch.key]
+    lines += _table_head("switch") + [f"| {switch.key} | {switch.label} |" for switch in switches]
     lines += _table_head("mouse") + [f"| {what} | {does} |" for what, does in mouse()]
     return "\n".join(lines[1:]) + "\n"
 

@@ -142,13 +142,13 @@ class Session:
         It replaces an older one about the same subject; by default the subject is the text.
         """
         about = about or text
-        self._notices = [one for one in self.notices() if one.about != about][-2:]
+        self._notices = [notice for notice in self.notices() if notice.about != about][-2:]
         self._notices.append(Notice(text, kind, self.clock() + seconds, about))
 
     def notices(self) -> list[Notice]:
         """Return the current notices, oldest first."""
         now = self.clock()
-        self._notices = [one for one in self._notices if one.until > now]
+        self._notices = [notice for notice in self._notices if notice.until > now]
         return list(self._notices)
 
     def request(self, what: str) -> None:
@@ -196,7 +196,6 @@ class Session:
 
     @property
     def idle(self) -> float:
-        """Seconds since the last input of the user."""
         return self.clock() - self.last_input
 
     @property
@@ -244,7 +243,8 @@ class Session:
 
     def switch_keys(self) -> list[tuple[str, str]]:
         """Return (key, label) of all switches that have a key."""
-        return [(self.switch_key(one), one.label) for one in SWITCHES.values() if self.switch_key(one)]
+        rows = ((self.switch_key(switch), switch.label) for switch in SWITCHES.values())
+        return [(key, label) for key, label in rows if key]
 
     def press_switch(self, key: str) -> bool:
         """Turn the switch with this key to its next value; return False without one."""
@@ -257,5 +257,4 @@ class Session:
         return False
 
     def camera(self, time: float) -> Camera:
-        """Return the camera at a time in seconds."""
         return self.viewpoint.camera_at(time)

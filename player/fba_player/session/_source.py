@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import threading
 import time as wall
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fba.animation import Animation
@@ -14,12 +13,16 @@ from fba.parameters import BapTable
 from fba_player.playback.live import LiveAnimation
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
-from fba_player.session._emotion_trace import Stretch, read_stretches
-from fba_player.session._timeline_trace import trace_of_motion, trace_of_planes
+from fba_player.session._timeline_trace import (
+    Stretch,
+    Trace,
+    read_stretches,
+    trace_of_motion,
+    trace_of_planes,
+)
 
 if TYPE_CHECKING:
     from fba.codec import StreamInfo
-    from fba_player.session._timeline_trace import Trace
     from fba_player.view.protocols import Showable
 
 REFRESH_SECONDS = 0.2
@@ -50,9 +53,7 @@ class Source:
         self._scene_info: StreamInfo | None = None
         self._format_and_size = ("animation", 0)
         animation: object = scene.animation if isinstance(scene, Scene) else None
-        self._live: Callable[[], StreamInfo] | None = None
-        if isinstance(animation, LiveAnimation):
-            self._live = animation.info
+        self._live = animation if isinstance(animation, LiveAnimation) else None
         self._updated = -REFRESH_SECONDS
         self._trace_info: StreamInfo | None = None
         self._trace: Trace | None = None
@@ -70,9 +71,9 @@ class Source:
         """Information about the stream; the same object until something changes."""
         if self._probed is not None:
             return self._probed
-        own, timeline, now = self._scene_info, self._scene.timeline, wall.monotonic()
+        before, timeline, now = self._scene_info, self._scene.timeline, wall.monotonic()
         due = not timeline.growing or now - self._updated >= REFRESH_SECONDS
-        if own is None or (own.frames != timeline.frames and due):
+        if before is None or (before.frames != timeline.frames and due):
             self._scene_info, self._updated = self._info_of_scene(), now
         assert self._scene_info is not None
         return self._scene_info
@@ -88,7 +89,6 @@ class Source:
 
     @property
     def probing(self) -> bool:
-        """Whether `probe` is still running in the background."""
         return self._thread is not None and self._thread.is_alive()
 
     @property
@@ -103,21 +103,14 @@ class Source:
         from fba.codec import StreamInfo
 
         if self._live is not None:
-            return self._live()
+            return self._live.info()
         animation, times = self._animation(), self._scene.timeline
         if isinstance(animation, Animation) and len(animation) == times.frames:
             return StreamInfo.of_animation(animation, *self._format_and_size)
         return StreamInfo(
-            format="stream",
-            size=0,
-            rate=times.rate,
-            frames=times.frames,
-            duration=times.duration,
-            start=times.start,
-            skipped=0,
-            face=None,
-            body=None,
-        )
+            format="stream", size=0, rate=times.rate, frames=times.frames, duration=times.duration,
+            start=times.start, skipped=0, face=None, body=None,
+        )  # fmt: skip
 
     def _animation(self) -> object:
         return self._scene.animation if isinstance(self._scene, Scene | CompareScene) else None

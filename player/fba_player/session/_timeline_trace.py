@@ -1,14 +1,23 @@
-"""The graph behind the timeline: bits of each plane, I planes in another colour, or amount of motion."""
+"""What lies behind and below the timeline.
+
+Behind: a graph of the bits of each plane, I planes in another colour, or of the amount of motion. Below: a
+strip of the expressions that a face shows.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby, pairwise
 
 import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Array, Bool, Float64, UInt8
 from fba.codec import StreamInfo
+from fba.emotion import Readings, read_expressions
+from fba.emotion.recogniser import NEUTRAL, UNKNOWN
+from fba.errors import OptionError
+from fba.face.resolve import FaceSettings
 
 PREDICTED = (120, 160, 190)
 INTRA = (238, 178, 84)
@@ -16,8 +25,10 @@ MIN_HEIGHT = 0.06
 """Least height of a plane, as a share of the full height."""
 MIN_GAP_WIDTH = 5
 """Pixels per plane from which there is a gap between planes."""
-ROWS = 4096
+FRAMES_AT_ONCE = 4096
 """Frames processed at once."""
+MAX_READ_FRAMES = 20_000
+"""Longer animations are not read: that would take more than some seconds beside the playing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +64,8 @@ def trace_of_motion(animation: Animation) -> Trace | None:
     for values in tables if len(animation) else []:
         spread = values.max(axis=0).astype(np.float64) - values.min(axis=0)
         used = np.flatnonzero(spread)
-        for start in range(0, len(moved) - 1, ROWS):
-            part = values[start : start + ROWS + 1][:, used].astype(np.float64)
+        for start in range(0, len(moved) - 1, FRAMES_AT_ONCE):
+            part = values[start : start + FRAMES_AT_ONCE + 1][:, used].astype(np.float64)
             moved[start + 1 : start + len(part)] += (np.abs(np.diff(part, axis=0)) / spread[used]).sum(axis=1)
     if not moved.any():
         return None
@@ -90,3 +101,52 @@ def trace_picture(trace: Trace, low: float, high: float, size: tuple[int, int]) 
     picture[..., :3] = np.where(key[:, None], INTRA, PREDICTED)
     picture[..., 3] = np.round(cover * np.where(key, 235, 150 if trace.bits else 90))
     return picture
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A time in which a face shows the same.
+
+    start, end: seconds of the timeline. label: a family, an expression without one, "neutral" or "unknown".
+    intensity: the mean, 0 to 100.
+    """
+
+    start: float
+    end: float
+    label: str
+    intensity: float
+
+    @property
+    def shows(self) -> bool:
+        """Whether it is an expression, not "neutral" or "unknown"."""
+        return self.label not in (NEUTRAL, UNKNOWN)
+
+    def __str__(self) -> str:
+        return f"{self.label} {self.intensity:.0f}" if self.shows else self.label
+
+
+def read_stretches(animation: Animation, model: FaceSettings | None) -> tuple[Stretch, ...]:
+    """Return the expressions of an animation in order; none without a face, or for a long animation."""
+    if animation.face is None or len(animation) > MAX_READ_FRAMES:
+        return ()
+    try:
+        readings = read_expressions(animation, model)
+    except OptionError:
+        return ()
+    return _stretches(readings, float(animation.index[0] / animation.rate), 1 / float(animation.rate))
+
+
+def stretch_at(stretches: tuple[Stretch, ...], time: float) -> Stretch | None:
+    """Return the stretch at a time in seconds; None without one."""
+    return next((stretch for stretch in stretches if stretch.start <= time < stretch.end), None)
+
+
+def _stretches(readings: Readings, begin: float, step: float) -> tuple[Stretch, ...]:
+    stretches = []
+    pairs = zip(readings.times.tolist(), readings.readings, strict=True)
+    groups = [(label, list(group)) for label, group in groupby(pairs, key=lambda pair: pair[1].label)]
+    starts = [group[0][0] for _, group in groups] + [readings.times[-1].item() + step]
+    for (label, group), (start, end) in zip(groups, pairwise(starts), strict=True):
+        intensity = float(np.mean([reading.intensity for _, reading in group]))
+        stretches.append(Stretch(begin + start, begin + end, label, intensity))
+    return tuple(stretches)

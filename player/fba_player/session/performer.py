@@ -120,9 +120,7 @@ class Performer:
 
 
 def neutral(*, body: bool = False, name: str = "puppet") -> Animation:
-    """Return a neutral face, with a standing body if `body` is True, for puppeteering: 10 s at 25
-    frames/s."""
+    """Return a neutral face, with a standing body if `body` is True: 10 s at 25 frames/s."""
     count = 25 * NEUTRAL_SECONDS
-    face = FaceTrack(np.zeros((count, 68), np.int32), np.zeros((count, 68), bool))
-    stands = BodyTrack(np.zeros((count, 296), np.int32), np.zeros((count, 296), bool)) if body else None
-    return Animation(Fraction(25), np.arange(count), face, stands, name)
+    standing = BodyTrack.empty(count) if body else None
+    return Animation(Fraction(25), np.arange(count), FaceTrack.empty(count), standing, name)

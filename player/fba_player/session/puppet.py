@@ -123,9 +123,8 @@ class Puppet:
         if expression.select1 == expression.select2:
             second = min(second, 1 - first)  # the same expression twice has at most full intensity
         table = self._definitions.expressions
-        self._felt = table[expression.select1] * np.float32(first) + table[expression.select2] * np.float32(
-            second
-        )
+        self._felt = table[expression.select1] * np.float32(first)
+        self._felt += table[expression.select2] * np.float32(second)
 
     def move_fap(self, number: int, value: float) -> None:
         """Set a FAP, 3 to 68, in its unit. ValueError for another number or a value that is not finite."""

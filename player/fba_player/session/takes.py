@@ -14,9 +14,9 @@ from fba.errors import FormatError, RangeError
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, BapTable
 from fba.tracks import BodyTrack, FaceTrack
 
-RATE = Fraction(25)
-"""Frames per second of a take where the rate of the animation is outside of `RATES`."""
-RATES = (5, 120)
+DEFAULT_TAKE_RATE = Fraction(25)
+"""Frames per second of a take where the rate of the animation is outside of `TAKE_RATES`."""
+TAKE_RATES = (5, 120)
 MAX_TAKE_SECONDS = 3600.0
 """Longest duration of a take."""
 HOLD_SECONDS = 0.2
@@ -27,7 +27,7 @@ ROOT_BAPS = slice(180, 186)
 
 def take_rate(rate: Fraction) -> Fraction:
     """Return the frame rate of a take over an animation with this rate."""
-    return rate if RATES[0] <= rate <= RATES[1] else RATE
+    return rate if TAKE_RATES[0] <= rate <= TAKE_RATES[1] else DEFAULT_TAKE_RATE
 
 
 class TakeRecorder:
@@ -118,8 +118,7 @@ class Takes:
         return self._takes.pop() if self._takes else None
 
     def path(self, name: str) -> Path:
-        """Return the path for a name: in the folder, with the suffix .fba. Raises FormatError for an empty
-        name."""
+        """Return the path for a name: in the folder, with the suffix .fba; FormatError for an empty name."""
         name = name.strip()
         if not name or name.endswith(("/", os.sep)) or name in (".", ".."):
             raise FormatError("is not a file name; give one, such as take.fba", path=name or "take")
@@ -144,11 +143,9 @@ class Takes:
         if self.last is None:
             raise FormatError("nothing was recorded that could be saved", path=path)
         if path.exists():
-            raise FormatError(
-                "exists already, and is not overwritten; choose another name, such as "
-                f"{self.free_name(path.stem)}",
-                path=path,
-            )
+            free = self.free_name(path.stem)
+            text = f"exists already, and is not overwritten; choose another name, such as {free}"
+            raise FormatError(text, path=path)
         import fba
 
         try:

@@ -56,9 +56,8 @@ class SoundMixer:
             due = (motion.time(now) - self.origin) * rate if motion.moving(now) else None
             self._continue_at(due, motion.speed)
             if self._cursor is not None:
-                mixed[done : done + piece] = self._fade_in(
-                    self._read_at_speed(self._cursor, self._speed, piece)
-                )
+                samples = self._read_at_speed(self._cursor, self._speed, piece)
+                mixed[done : done + piece] = self._fade_in(samples)
                 self._cursor += piece * self._speed
             ending = min(piece, len(self._tail))
             mixed[done : done + ending] += self._tail[:ending]
@@ -69,12 +68,8 @@ class SoundMixer:
 
     def _continue_at(self, due: float | None, speed: float) -> None:
         """Go on with the sample that is due; fade out the last one if this is a jump. None: silence."""
-        here = self._cursor
-        if (
-            here is not None
-            and due is not None
-            and abs(due - here) <= SLIP_SECONDS * self._rate * max(speed, 1.0)
-        ):
+        here, slip = self._cursor, SLIP_SECONDS * self._rate * max(speed, 1.0)
+        if here is not None and due is not None and abs(due - here) <= slip:
             self._speed = speed
             return
         if here is not None:
@@ -100,11 +95,9 @@ class SoundMixer:
         if speed < 1.0:
             rows = at[:-1].astype(np.intp)
             share = (at[:-1] - rows).astype(np.float32)[:, None]
-            slow: Float32 = samples[rows] * (1 - share) + samples[rows + 1] * share
-            return slow
+            return np.asarray(samples[rows] * (1 - share) + samples[rows + 1] * share)
         # The mean over the samples that become one: it removes the tones that would alias.
         sums = np.concatenate([np.zeros((1, 2)), np.cumsum(samples, axis=0, dtype=np.float64)])
         rows = np.minimum(at.astype(np.intp), len(samples) - 1)
         integral = sums[rows] + samples[rows] * (at - rows)[:, None]
-        fast: Float32 = (np.diff(integral, axis=0) / speed).astype(np.float32)
-        return fast
+        return (np.diff(integral, axis=0) / speed).astype(np.float32)

@@ -9,8 +9,7 @@ from fba_player.gl._context import cure
 
 
 def import_av(purpose: str = "films need") -> Any:
-    """Return the module `av`; DisplayError where it cannot be imported. purpose: the beginning of the
-    message."""
+    """Return the module `av`; DisplayError without it. purpose: the beginning of its message."""
     try:
         import av
     except ImportError as error:

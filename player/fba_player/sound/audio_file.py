@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Iterator
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +14,14 @@ from fba.arrays import Int16
 from fba.atomic import PathLike
 from fba.errors import FbaWarning, FormatError
 from fba_player.sound._pyav import av_version, import_av
+from fba_player.view.protocols import Closing
 
 CHANNELS = 2
-RATES = (8000, 192_000)
+PLAYABLE_RATES = (8000, 192_000)
 """Samples per second, least and most; other rates are resampled to `USUAL_RATE`."""
 USUAL_RATE = 48_000
-MIN_RATE = 1000
-MAX_RATE = 1_000_000
-"""Limits of the samples per second that are read: resampling costs time and memory by the change of rate."""
+READABLE_RATES = (1000, 1_000_000)
+"""Samples per second, least and most, that are read: resampling costs memory by the change of rate."""
 RUN_UP_SECONDS = 0.5
 """Seconds decoded before the first sample that is read: MP3 and AAC frames need the ones before them."""
 MIN_GAP_SECONDS = 0.02
@@ -51,7 +52,7 @@ def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
     return container, stream
 
 
-class SoundFile:
+class SoundFile(Closing):
     """The first audio track of a file, as stereo samples at one rate.
 
     path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rates: samples per second that need no
@@ -71,14 +72,10 @@ class SoundFile:
         self._rates = rates
         self._open()
         self.rate = self._rate(int(self._stream.rate or 0))
-        length, base = self._stream.duration, self._stream.time_base
-        container_length = self._container.duration
-        if length is None or not base:
-            self.duration = (
-                None if container_length is None else max(float(container_length / av.time_base), 0.0)
-            )
-        else:
-            self.duration = max(float(length * base), 0.0)
+        length, seconds = self._stream.duration, self._stream.time_base
+        if length is None or not seconds:
+            length, seconds = self._container.duration, Fraction(1, av.time_base)
+        self.duration = None if length is None else max(float(length * seconds), 0.0)
         self._first = 0  # sample that the first part since the last seek begins with
         self._parts: Iterator[Int16] = iter(())
         self._next: int | None = None  # sample that the next part begins with
@@ -88,14 +85,10 @@ class SoundFile:
             raise FormatError("holds no sound that can be decoded", path=path)
 
     def read(self, start: int, count: int) -> Int16:
-        """Return the samples int16 (count, 2) from sample number `start` on; fewer, or none, where the sound
-        ends."""
+        """Return the samples int16 (count, 2) from number `start` on; fewer where the sound ends."""
         start, missing = max(start, 0), max(count, 0)
-        at = self._next
-        if (
-            at is None
-            or not 0 <= start - at + len(self._rest) <= len(self._rest) + RUN_UP_SECONDS * self.rate
-        ):
+        at, kept = self._next, len(self._rest)
+        if at is None or not 0 <= start - at + kept <= kept + RUN_UP_SECONDS * self.rate:
             at = self._seek(start)
         pieces: list[Int16] = []
         while missing > 0:
@@ -119,23 +112,16 @@ class SoundFile:
         if self._container is not None:
             self._container.close()
 
-    def __enter__(self) -> SoundFile:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _open(self) -> None:
         if self._container is not None:
             self._container.close()
         self._container, self._stream = open_sound(self._av, self.path)
 
     def _rate(self, rate: int) -> int:
-        if not MIN_RATE <= rate <= MAX_RATE:
-            raise FormatError(
-                f"claims {rate} samples a second; {MIN_RATE} to {MAX_RATE} can be read", path=self.path
-            )
-        fits = rate in self._rates if self._rates else RATES[0] <= rate <= RATES[1]
+        low, high = READABLE_RATES
+        if not low <= rate <= high:
+            raise FormatError(f"claims {rate} samples a second; {low} to {high} can be read", path=self.path)
+        fits = rate in self._rates if self._rates else PLAYABLE_RATES[0] <= rate <= PLAYABLE_RATES[1]
         return rate if fits else USUAL_RATE
 
     def _seek(self, start: int) -> int:
@@ -155,8 +141,7 @@ class SoundFile:
         return self._first + len(self._rest)
 
     def _decode_parts(self) -> Iterator[Int16]:
-        """Yield the parts (N, 2) from where the container is; sets `_first` to the number of the first
-        sample."""
+        """Yield the parts (N, 2) from where the container is; set `_first` to the first sample's number."""
         stream = self._stream
         convert = _Converter(self._av, self.rate, mono=stream.channels == 1)
         begun, at = stream.start_time or 0, None
@@ -228,9 +213,9 @@ class _Converter:
         try:
             pieces = self._resampler.resample(frame)
         except ValueError:  # another format than before
-            held = self._resampler.resample(None)
+            rest = self._resampler.resample(None)
             self._resampler = self._new_resampler()
-            pieces = held + self._resampler.resample(frame)
+            pieces = rest + self._resampler.resample(frame)
         parts = []
         for piece in pieces:
             samples = np.asarray(piece.to_ndarray(), dtype=np.int16).reshape(-1, self._sides)

@@ -25,6 +25,7 @@ from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
 from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.soundtrack import find_sound_beside
+from fba_player.view.protocols import Closing
 
 __all__ = ["Audio", "find_sound_beside", "open_audio"]
 
@@ -44,7 +45,7 @@ class NoDeviceError(Exception):
     """No sound can be played on this machine; the text says why."""
 
 
-class Audio:
+class Audio(Closing):
     """Plays an audio file in step with a transport; a context manager.
 
     path: anything that FFmpeg reads. transport: follows the device's clock from now on. offset: seconds by
@@ -76,7 +77,7 @@ class Audio:
             self._device.start(samples_for_device)
         except Exception as error:
             self.close()
-            raise NoDeviceError(", ".join(str(one) for one in error.args) or type(error).__name__) from error
+            raise NoDeviceError(", ".join(map(str, error.args)) or type(error).__name__) from error
         transport.use_clock(self.clock, self.clock.latency)
 
     @property
@@ -118,12 +119,6 @@ class Audio:
             self._device = None
             self.transport.use_clock(wall.monotonic)
         self._blocks.close()
-
-    def __enter__(self) -> Audio:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _device_samples(self) -> Generator[bytes, int, None]:
         """Yield the samples for the device as bytes; runs in its thread."""
@@ -220,7 +215,6 @@ def _open_device(rate: int, backend: str | None) -> Any:
             f"it needs the Python package miniaudio, which cannot be imported: {error}. "
             + cure(error, "mpeg4-fba[player]")
         ) from error
-    silent = miniaudio.Backend.NULL
     with _silence_stderr():
         device = miniaudio.PlaybackDevice(
             output_format=miniaudio.SampleFormat.SIGNED16,
@@ -228,7 +222,7 @@ def _open_device(rate: int, backend: str | None) -> Any:
             sample_rate=rate,
             buffersize_msec=round(PERIOD * 1000),
             callback_periods=PERIODS,
-            backends=[silent] if backend == "null" else None,
+            backends=[miniaudio.Backend.NULL] if backend == "null" else None,
             app_name="fba",
         )
     if backend != "null" and str(device.backend).lower() == "null":

@@ -14,7 +14,7 @@ from fba.atomic import PathLike
 from fba.formats.time_codes import parse_time_code
 from fba_player.sound._pyav import import_av
 from fba_player.sound.audio_file import open_sound
-from fba_player.sound.soundtrack import BLOCK, Soundtrack
+from fba_player.sound.soundtrack import AAC_FRAME, Soundtrack
 
 FULL = 32767
 """The largest sample of 16 bits."""
@@ -30,8 +30,8 @@ def read_time_of_day(path: PathLike) -> float | None:
     container, stream = open_sound(import_av("sound needs"), Path(path))
     try:
         tags = dict(container.metadata)
-        film = [one for one in container.streams if one.type in ("video", "data")]
-        code = tags.get("timecode") or next((one.metadata.get("timecode") for one in film), None)
+        film = [other for other in container.streams if other.type in ("video", "data")]
+        code = tags.get("timecode") or next((other.metadata.get("timecode") for other in film), None)
         reference = str(tags.get("time_reference", ""))
         if code:
             return parse_time_code(code, _film_rate(film))
@@ -57,7 +57,7 @@ def write_clip(file: BinaryIO, path: PathLike, start: Fraction, seconds: Fractio
             missing = round(seconds * source.rate)
             target.setnframes(missing)
             while missing > 0:
-                count = min(missing, BLOCK)
+                count = min(missing, AAC_FRAME)
                 target.writeframes(_samples(source.take(count)).tobytes())
                 missing -= count
     finally:
@@ -66,11 +66,10 @@ def write_clip(file: BinaryIO, path: PathLike, start: Fraction, seconds: Fractio
 
 def _samples(block: Any) -> Int16:
     """Return samples of 16 bits (N, channels) of float ones (channels, N), -1..1."""
-    result: Int16 = np.rint(np.clip(block.T, -1.0, 1.0) * FULL).astype("<i2")
-    return result
+    return np.asarray(np.rint(np.clip(block.T, -1.0, 1.0) * FULL).astype("<i2"))
 
 
 def _film_rate(streams: list[Any]) -> Fraction | None:
     """Return the frames in a second of the first stream of pictures; None without one."""
-    rates = (one.average_rate for one in streams if one.type == "video")
+    rates = (stream.average_rate for stream in streams if stream.type == "video")
     return next((Fraction(rate) for rate in rates if rate), None)

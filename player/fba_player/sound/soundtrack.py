@@ -1,23 +1,29 @@
-"""The sound track of a film: any part of an audio file."""
+"""The sound track of a film: a part of an audio file, or what is heard while a window is recorded."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from fba.arrays import Float32
+from fba.arrays import Float32, Int16
 from fba.atomic import PathLike
 from fba.errors import FormatError
+from fba_player.playback.transport import Transport
+from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._pyav import import_av
-from fba_player.sound.audio_file import open_sound
+from fba_player.sound.audio_file import CHANNELS, SoundFile, open_sound
 
 AAC_RATES = (96000, 88200, 64000, 48000, 44100, 32000, 24000, 22050, 16000, 12000, 11025, 8000)
-BLOCK = 1024
+AAC_FRAME = 1024
 """Samples of an AAC frame."""
+PIECE_SECONDS = 1.0
+"""Most seconds mixed at once."""
 
 
 class FilmedSound(Protocol):
@@ -28,8 +34,7 @@ class FilmedSound(Protocol):
     layout: str
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """Return the next samples, or those of them that are ready, as `av.AudioFrame`s ("fltp") without
-        times."""
+        """Return the next samples that are ready, as `av.AudioFrame`s ("fltp") without times."""
 
     def close(self) -> None:
         """Release its resources; safe to call twice."""
@@ -73,9 +78,9 @@ class Soundtrack:
         self._container.close()
 
     def frames(self, samples: int) -> Iterator[Any]:
-        """Yield the next samples as `av.AudioFrame`s ("fltp") of at most `BLOCK` samples, without times."""
-        for start in range(0, samples, BLOCK):
-            yield make_frame(self._av, self.take(min(BLOCK, samples - start)), self.layout, self.rate)
+        """Yield the next samples as `av.AudioFrame`s ("fltp") of at most `AAC_FRAME`, without times."""
+        for start in range(0, samples, AAC_FRAME):
+            yield make_frame(self._av, self.take(min(AAC_FRAME, samples - start)), self.layout, self.rate)
 
     def take(self, samples: int) -> Float32:
         """Return the next samples, float32 (channels, samples), -1..1; zeros after the end of the file."""
@@ -90,7 +95,7 @@ class Soundtrack:
 
     def _decode_samples(self) -> Any:
         while self._silence > 0:
-            count = min(self._silence, BLOCK)
+            count = min(self._silence, AAC_FRAME)
             self._silence -= count
             yield np.zeros((self.channels, count), dtype=np.float32)
         resampler = self._av.AudioResampler(format="fltp", layout=self.layout, rate=self.rate)
@@ -121,3 +126,81 @@ def make_frame(av: Any, samples: Float32, layout: str, rate: int) -> Any:
 def check_sound(path: PathLike) -> None:
     """Raise FormatError where a file cannot be read as sound."""
     Soundtrack(path, Fraction(0)).close()
+
+
+class FilmSound:
+    """Samples for a film of the window, with pauses and jumps as they are heard; a `FilmedSound`.
+
+    path: an audio file. transport: what is played. offset: returns the seconds by which the sound begins
+    after the first frame. muted: returns whether it is silent now.
+
+    The window's thread calls `advance` and `end`, the encoder's `frames`. It needs no sound device. Raises
+    FormatError where the file cannot be read.
+    """
+
+    def __init__(
+        self,
+        path: PathLike,
+        transport: Transport,
+        *,
+        offset: Callable[[], float] = lambda: 0.0,
+        muted: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self.path = Path(path)
+        self._av = import_av()
+        self._file = SoundFile(path, rates=AAC_RATES)
+        self.rate = self._file.rate
+        self.channels, self.layout = CHANNELS, "stereo"
+        self._transport, self._offset, self._muted = transport, offset, muted
+        self._mixer = SoundMixer(self._take, self.rate, lambda: transport.motion, transport.start)
+        self._mixed: deque[Int16] = deque()
+        self._lock = threading.Lock()
+        self._done = 0
+        self._ended = False
+
+    def advance(self, seconds: float) -> None:
+        """Mix the sound up to a length of the film in seconds, which the transport has reached now."""
+        now = self._transport.clock
+        self._mixer.origin = self._transport.start + self._offset()
+        self._mixer.muted = self._muted()
+        missing = round(seconds * self.rate) - self._done
+        while missing > 0:
+            count = min(missing, round(PIECE_SECONDS * self.rate))
+            samples = self._mixer.fill(now - missing / self.rate, count)
+            with self._lock:
+                self._mixed.append(samples)
+            self._done += count
+            missing -= count
+
+    def end(self) -> None:
+        """End the sound: the rest of the film is silent."""
+        self._ended = True
+
+    def frames(self, samples: int) -> Iterator[Any]:
+        """Yield the next samples as far as they are mixed, as `av.AudioFrame`s ("fltp") without times."""
+        while samples > 0:
+            most = min(samples, AAC_FRAME)
+            with self._lock:
+                part = self._mixed.popleft() if self._mixed else None
+                if part is not None and len(part) > most:
+                    self._mixed.appendleft(part[most:])
+            if part is None:
+                if not self._ended:
+                    return
+                part = np.zeros((most, CHANNELS), dtype=np.int16)
+            part = part[:most]
+            samples -= len(part)
+            block = np.ascontiguousarray(part.T, dtype=np.float32) / np.float32(32768)
+            yield make_frame(self._av, block, self.layout, self.rate)
+
+    def close(self) -> None:
+        """Close the file; safe to call twice."""
+        self._file.close()
+
+    def _take(self, start: int, count: int) -> Int16:
+        """Return the samples int16 (count, 2) of the file; zeros outside."""
+        taken = np.zeros((count, CHANNELS), dtype=np.int16)
+        first = min(max(-start, 0), count)
+        samples = self._file.read(start + first, count - first)
+        taken[first : first + len(samples)] = samples
+        return taken

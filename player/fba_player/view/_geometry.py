@@ -8,35 +8,36 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Floating
-from fba.rotations import quaternions
+from fba.rotations import quaternions, unit
 from fba_player.view._view import FaceMesh
 from fba_player.view.camera import Camera
+
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom of an upright rectangle."""
 
 
 def world_positions(mesh: FaceMesh) -> Float32:
     """Return float32 (V, 3): the mesh's positions in the world."""
     turned = turn_partly(mesh.positions, mesh.shape.sway, mesh.turn, mesh.centre)
-    world: Float32 = (turned @ mesh.matrix[:3, :3].T + mesh.matrix[:3, 3]).astype(np.float32)
-    return world
+    return transform(turned, mesh.matrix).astype(np.float32)
 
 
 def world_normals(mesh: FaceMesh) -> Float32:
     """Return float32 (V, 3): the mesh's unit normals in the world."""
     turned = turn_partly(mesh.normals, mesh.shape.sway, mesh.turn, np.zeros(3)) @ mesh.matrix[:3, :3].T
-    return unit_rows(turned).astype(np.float32)
+    return unit(turned).astype(np.float32)
 
 
-def unit_rows(vectors: Float64) -> Float64:
-    """Return float64 (N, 3): vectors scaled to length 1; those of length 0 stay."""
-    unit: Float64 = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)
-    return unit
+def transform(points: Floating, matrix: Float64) -> Float64:
+    """Return points (..., 3), moved by a matrix (4, 4)."""
+    moved: Float64 = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return moved
 
 
 def turn_partly(positions: Floating, sway: Floating, turn: Float64, centre: Float64) -> Float64:
-    """Return float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of a
-    rotation.
+    """Return float64 (V, 3): positions turned about `centre` (3,), each by its share `sway` (V,) of `turn`.
 
-    turn: (3,), the rotation's axis times its angle.
+    turn: (3,), the axis of a rotation times its angle.
     """
     start = positions.astype(np.float64)
     angle = float(np.linalg.norm(turn))
@@ -69,6 +70,17 @@ def translation(offset: npt.ArrayLike) -> Float64:
     return matrix
 
 
+def project(points: Float64, matrix: Float64, size: tuple[int, int]) -> tuple[Float64, Float64]:
+    """Return pixels (N, 2) from the upper left, and depths (N,), 0..1, of points (N, 3).
+
+    Points behind the camera get NaN. matrix: (4, 4), world to clip space. size: of the picture in pixels.
+    """
+    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    clip[clip[:, 3] < 1e-6] = np.nan
+    flat = clip[:, :3] / clip[:, 3:]
+    return (flat[:, :2] * (0.5, -0.5) + 0.5) * size, flat[:, 2] * 0.5 + 0.5
+
+
 def ray_through(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tuple[Float64, Float64]:
     """Return (origin (3,), unit direction (3,)) of the ray through a pixel, in the world.
 
@@ -79,6 +91,13 @@ def ray_through(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tu
     up = (1 - 2 * y / size[1]) * tall
     direction = np.array([right, up, -1.0]) @ camera.view_matrix()[:3, :3]
     return camera.eye, direction / np.linalg.norm(direction)
+
+
+def overlap(first: Box, second: Box) -> float:
+    """Return the area that two boxes share."""
+    wide = min(first[2], second[2]) - max(first[0], second[0])
+    high = min(first[3], second[3]) - max(first[1], second[1])
+    return max(wide, 0.0) * max(high, 0.0)
 
 
 def first_hit(origin: Float64, direction: Float64, corners: Float64) -> tuple[int, Float64] | None:

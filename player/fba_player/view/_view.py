@@ -178,8 +178,11 @@ class Dots:
 
 @dataclass(frozen=True)
 class Grid:
-    """A grid on a horizontal plane at y = height. step: metres between bold lines, with ten fine steps
-    between them. centre: x and z of its middle. reach: metres from there at which it has faded out."""
+    """A grid on a horizontal plane at y = height.
+
+    step: metres between bold lines, with ten fine steps between them. centre: x and z of its middle. reach:
+    metres from there at which it has faded out.
+    """
 
     height: float
     step: float
@@ -189,13 +192,15 @@ class Grid:
 
 @dataclass(frozen=True)
 class Legend:
-    """Explains colours. title, unit: text. most: value of the last colour; the first is 0. stops: colours at
-    equal steps."""
+    """Explains colours.
+
+    title, unit: text. most: value of the last colour; the first is 0. stops: colours (3,) at equal steps.
+    """
 
     title: str
     unit: str
     most: float
-    stops: tuple[tuple[float, float, float], ...]
+    stops: tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,14 +236,11 @@ class View:
 
 
 def spheres(centres: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:
-    """Return float32 (N, 16): spheres as capsules. centres: (N, 3), and radii (N,), metres. colour: with
-    gloss."""
+    """Return float32 (N, 16): spheres as capsules. centres (N, 3), radii (N,): metres. colour: with gloss."""
     starts = np.asarray(centres, dtype=np.float32)
     capsules = np.zeros((len(starts), CAPSULE_FLOATS), dtype=np.float32)
     capsules[:, 0:3] = starts
-    capsules[:, 4:7] = starts + np.array(
-        [0.0, 2e-5, 0.0], dtype=np.float32
-    )  # the axis must not have length 0
+    capsules[:, 4:7] = starts + np.array([0.0, 2e-5, 0.0], dtype=np.float32)  # an axis must have a length
     capsules[:, 3] = capsules[:, 7] = radii
     capsules[:, 8:12] = (0.0, 0.0, 1.0, 1.0)
     capsules[:, 12:16] = colour
@@ -247,5 +249,5 @@ def spheres(centres: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, .
 
 def srgb(text: str) -> tuple[float, float, float]:
     """Return linear light (3 values, 0..1) of a colour "#rrggbb" in sRGB."""
-    red, green, blue = linear_light(np.array([int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)])).tolist()
+    red, green, blue = linear_light(np.array([*bytes.fromhex(text[1:])]) / 255).tolist()
     return red, green, blue

@@ -9,12 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64
 
-PRESETS = {
-    "front": (0.0, 0.0),
-    "three-quarter": (35.0, 5.0),
-    "profile": (90.0, 0.0),
-    "body": (25.0, 8.0),
-}
+PRESETS = {"front": (0.0, 0.0), "three-quarter": (35.0, 5.0), "profile": (90.0, 0.0), "body": (25.0, 8.0)}
 """Yaw (to the subject's left) and pitch (from above) of the named views, degrees."""
 PITCH_LIMIT = 89.0
 DISTANCES = (0.05, 100.0)
@@ -96,8 +91,7 @@ class Camera:
     @property
     def eye(self) -> Float64:
         """(3,) position of the camera."""
-        eye: Float64 = np.array(self.target) + self._axes()[2] * self.distance
-        return eye
+        return np.asarray(self.target + self._axes()[2] * self.distance)
 
     def view_matrix(self) -> Float64:
         """Return (4, 4) matrix from world to camera space."""
@@ -116,6 +110,10 @@ class Camera:
         matrix[2, 2], matrix[2, 3] = (far + near) / (near - far), 2 * far * near / (near - far)
         matrix[3, 2] = -1.0
         return matrix
+
+    def clip_matrix(self, size: tuple[int, int]) -> Float64:
+        """Return (4, 4) matrix from world to clip space, for a picture of this size in pixels."""
+        return np.asarray(self.projection_matrix(size[0] / max(size[1], 1)) @ self.view_matrix())
 
     def _axes(self) -> Float64:
         """Rows: right, up and backward of the camera, in the world."""

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 from fba_player.view._view import View
 from fba_player.view.camera import Camera
@@ -58,9 +58,10 @@ Own = TypeVar("Own", bound=Times)
 
 
 class Timed(Generic[Own]):
-    """Gives a scene the times of its timeline."""
+    """The base of scenes: the times of its timeline, its switches, a figure that stays where it is."""
 
     timeline: Own
+    switches: Switches
 
     @property
     def rate(self) -> Fraction:
@@ -76,6 +77,35 @@ class Timed(Generic[Own]):
     def duration(self) -> Fraction:
         """Seconds from the first frame to the end of the last."""
         return self.timeline.duration
+
+    def show(self, name: str, on: object = True) -> None:
+        """Set a switch: True or False, a choice's word, or a FAP by name or number; see `SWITCHES`.
+
+        Raises ValueError for a switch that does not exist or a value that it cannot have.
+        """
+        self.switches.show(name, on)
+
+    def travel(self, time: float) -> tuple[float, float, float]:
+        """Return the offset (x, y, z) of a following camera, metres; zeros if it does not follow."""
+        return 0.0, 0.0, 0.0
+
+    def head_travel(self, time: float) -> tuple[float, float, float]:
+        """Return the displacement of the head from the start to a time, metres; by default that of all."""
+        return self.travel(time)
+
+
+class Closing:
+    """A context manager that calls `close` at the end of its block."""
+
+    def close(self) -> None:
+        """Release its resources; safe to call twice."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 class Showable(Protocol):
@@ -104,12 +134,10 @@ class Showable(Protocol):
         """Return everything to be drawn at a time in seconds; ValueError if it is not finite."""
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
-        """Return a camera for the named preset, or for what the content suggests; ValueError for an unknown
-        name."""
+        """Return a camera for a preset, or what the content suggests; ValueError for an unknown name."""
 
     def travel(self, time: float) -> tuple[float, float, float]:
         """Return the offset of a following camera at a time, metres; zeros if it does not follow."""
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
-        """Return the displacement of the head from the start to a time, metres, for a camera that looks at
-        it."""
+        """Return the displacement of the head from the start to a time, metres."""

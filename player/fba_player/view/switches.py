@@ -47,8 +47,10 @@ class Switch:
         return self._fap(value)
 
     def next(self, value: Value) -> Value:
-        """Return the value after `value` when the key is pressed: a flag turns over, a choice moves on, a FAP
-        turns off, or on to open_jaw."""
+        """Return the value after `value` when the key is pressed.
+
+        A flag turns over, a choice moves on, a FAP turns off, or on to open_jaw.
+        """
         if self.kind == "flag":
             return not value
         if self.kind == "choice":
@@ -96,10 +98,8 @@ def _table() -> dict[str, Switch]:
     for row in csv.DictReader(text.splitlines()):
         choices = tuple(row["choices"].split())
         default: Value = {"flag": row["default"] == "on", "choice": row["default"], "fap": None}[row["kind"]]
-        name = row["name"]
-        table[name] = Switch(
-            name, row["key"], row["label"], row["kind"], default, choices, row["description"]
-        )
+        shown = row["name"], row["key"], row["label"], row["kind"]
+        table[row["name"]] = Switch(*shown, default, choices, row["description"])
     return table
 
 
@@ -138,7 +138,8 @@ class Switches(Mapping[str, Value]):
 
     def press(self, name: str) -> None:
         """Do what the switch's key does: turn a flag over, move a choice on to its next word."""
-        self.show(name, _find_switch(name).next(self._values[_find_switch(name).name]))
+        switch = _find_switch(name)
+        self.show(name, switch.next(self._values[name]))
 
     @property
     def changed(self) -> dict[str, Value]:

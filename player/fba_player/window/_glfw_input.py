@@ -93,7 +93,6 @@ class GlfwInput:
         self._on_input()
 
     def on_character(self, window: Any, character: int) -> None:
-        """Pass a typed character to imgui."""
         if self._gui is not None:
             self._gui.io.add_input_character(character)
             self._on_input()
@@ -123,13 +122,11 @@ class GlfwInput:
         self._on_input()
 
     def on_enter(self, window: Any, entered: int) -> None:
-        """Handle the mouse entering or leaving the window."""
         if self._gui is not None and not entered:
             self._gui.io.add_mouse_pos_event(-3.4e38, -3.4e38)
         self._on_input()
 
     def on_scroll(self, window: Any, right: float, up: float) -> None:
-        """Handle a turn of the wheel."""
         self._session.touched()
         if self._gui is not None:
             self._gui.io.add_mouse_wheel_event(right, up)
@@ -138,7 +135,6 @@ class GlfwInput:
         self._on_input()
 
     def on_focus(self, window: Any, focused: int) -> None:
-        """Handle the window getting or losing the keyboard focus."""
         if self._gui is not None:
             self._gui.io.add_focus_event(bool(focused))
 
@@ -159,8 +155,7 @@ class GlfwInput:
         glfw.set_cursor(self._window, self._cursors.get(shape))
 
     def name(self, key: int, code: int, modifiers: int) -> str | None:
-        """Return the name of a key as in the table of keys: "space", "l", "shift+left", "ctrl+s"; None
-        without one."""
+        """Return a key's name in the table of keys, "space", "shift+left", "ctrl+s"; None without one."""
         glfw = self._glfw
         word = self._key_names.get(key)
         if word is None:
@@ -189,13 +184,9 @@ class GlfwInput:
         glfw, io = self._glfw, self._gui.io
         if action == glfw.REPEAT:
             return
-        for mask, word in (
-            (glfw.MOD_CONTROL, imgui.Key.mod_ctrl),
-            (glfw.MOD_SHIFT, imgui.Key.mod_shift),
-            (glfw.MOD_ALT, imgui.Key.mod_alt),
-            (glfw.MOD_SUPER, imgui.Key.mod_super),
-        ):
-            io.add_key_event(word, bool(modifiers & mask))
+        for ours, name in (("CONTROL", "ctrl"), ("SHIFT", "shift"), ("ALT", "alt"), ("SUPER", "super")):
+            pressed = bool(modifiers & getattr(glfw, f"MOD_{ours}"))
+            io.add_key_event(getattr(imgui.Key, f"mod_{name}"), pressed)
         if key in self._imgui_keys:
             io.add_key_event(self._imgui_keys[key], action == glfw.PRESS)
 

@@ -57,7 +57,6 @@ class Overlay:
             self._show("help", panel, left, top, session.size)
 
     def close(self) -> None:
-        """Release its resources."""
         for part in (*self._textures.values(), self._array, self._square, self._program):
             part.release()
         self._textures.clear()

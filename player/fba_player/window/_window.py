@@ -28,13 +28,13 @@ from fba_player.session._pages import page_of
 from fba_player.session._session import Session
 from fba_player.session._source import Source
 from fba_player.view.camera import Camera
+from fba_player.view.protocols import Closing
 from fba_player.window._glfw_input import GlfwInput
 from fba_player.window._plain_overlay import Overlay, draw_opening
 from fba_player.window.display import HOW_WITHOUT, FullScreen, start_glfw
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
-
 
 LOST = (
     "OpenGL stopped working ({reason}): the graphics driver was reset, or has no memory left. Start the "
@@ -50,7 +50,7 @@ SETTLING_PICTURES = 4
 """Pictures drawn after an input: imgui needs some until the panels have settled."""
 
 
-class Window:
+class Window(Closing):
     """A window that shows a scene; a context manager. See `fba.player.play`.
 
     There can be one at a time, in the main thread. panels: False shows the plain timeline instead of panels,
@@ -101,7 +101,6 @@ class Window:
 
     @property
     def transport(self) -> Transport:
-        """The current time, playing, and what else `Transport` has."""
         return self.session.transport
 
     def run(self) -> None:
@@ -168,12 +167,6 @@ class Window:
                 self._window = None
             self._glfw.terminate()
 
-    def __enter__(self) -> Window:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _open(self, size: tuple[int, int]) -> None:
         glfw = self._glfw
         moderngl = import_moderngl()
@@ -225,11 +218,8 @@ class Window:
                 self._gui = Gui(self._gl, session)
             except (ImportError, RuntimeError) as error:
                 remedy = cure(error, "mpeg4-fba[player]")
-                warnings.warn(
-                    f"the window has no panels, as imgui cannot be used: {error}. {remedy}",
-                    FbaWarning,
-                    stacklevel=4,
-                )
+                text = f"the window has no panels, as imgui cannot be used: {error}. {remedy}"
+                warnings.warn(text, FbaWarning, stacklevel=4)
         if self._gui is None:
             self.controls = Controls(session, plain=True)
             self._overlay = Overlay(self._gl)

@@ -18,17 +18,6 @@ def check_display(instead: str = HOW_WITHOUT) -> None:
     start_glfw([], instead).terminate()
 
 
-def check_page(subject: str, instead: str) -> None:
-    """Raise DisplayError, which ends with what to do instead, if the page for a subject cannot be shown."""
-    try:
-        import imgui_bundle  # noqa: F401 - pages are made with it
-    except ImportError as error:
-        raise DisplayError(
-            f"the page for {subject} needs imgui: {error}. {cure(error, 'mpeg4-fba[player]')}. {instead}"
-        ) from error
-    check_display(instead)
-
-
 def start_glfw(problems: list[str], instead: str = HOW_WITHOUT) -> Any:
     """Start glfw and return the module. problems: gets the messages that glfw reports from now on.
 

@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -75,7 +75,7 @@ def play(
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
     scene: Showable
     if isinstance(animation, LiveAnimation):
-        scene = Scene(animation, timeline=LiveTimeline(animation))  # type: ignore[arg-type]
+        scene = Scene(cast(Animation, animation), timeline=LiveTimeline(animation))
     else:
         scene = as_scene(animation)
     source = Source(scene, file, bap_steps=bap_steps, warnings=warnings)
@@ -108,9 +108,8 @@ def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
     session.sound, session.sound_offset = path, offset
     if session.audio is None:
         name = os.path.basename(os.fspath(path))
-        session.say(
-            f"There is no sound device: {name} is not heard, but recorded films have it", "warning", 8.0
-        )
+        text = f"There is no sound device: {name} is not heard, but recorded films have it"
+        session.say(text, "warning", 8.0)
     return session.audio
 
 

@@ -96,7 +96,7 @@ def test_a_clip_shows_itself_as_a_small_film(talking: Animation) -> None:
 
 
 @pytest.mark.usefixtures("opengl")
-def test_long_clips_are_cut_and_fast_ones_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_clips_are_cut_and_fast_clips_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(notebook, "MAX_FILM_SECONDS", 0.05)
     long = Animation(120, np.array([0, 9000]), face=face_track([{3: 1}, {3: 900}]))
     preview = Preview(long, width=48, start=2.0)

@@ -6,7 +6,6 @@ import subprocess
 import sys
 import threading
 import time
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +51,7 @@ class Full(Slow):
 
 def test_a_window_does_not_wait(tmp_path: Path) -> None:
     sink = Slow()
-    recorder = Recorder.into(sink, tmp_path / "x", SIZE, Fraction(10))
+    recorder = Recorder(tmp_path / "x", SIZE, rate=10, sink=sink)
     taken = [recorder.add(BLACK, number / 10, wait=False) for number in range(MAX_WAITING_PICTURES + 3)]
     assert taken == [True] * MAX_WAITING_PICTURES + [False] * 3
     assert recorder.dropped == 3
@@ -65,7 +64,7 @@ def test_a_window_does_not_wait(tmp_path: Path) -> None:
 def test_waiting_adds_every_picture(tmp_path: Path) -> None:
     sink = Slow()
     threading.Timer(0.05, sink.go.set).start()
-    with Recorder.into(sink, tmp_path / "x", SIZE, Fraction(10)) as recorder:
+    with Recorder(tmp_path / "x", SIZE, rate=10, sink=sink) as recorder:
         assert all(recorder.add(BLACK) for _ in range(3 * MAX_WAITING_PICTURES))
     assert sink.numbers == list(range(3 * MAX_WAITING_PICTURES))
     assert sink.aborted == 0
@@ -80,7 +79,7 @@ def test_pictures_are_copied(tmp_path: Path) -> None:
             seen.append(int(pixels[0, 0, 0]))
 
     sink, pixels = Looking(), BLACK.copy()
-    with Recorder.into(sink, tmp_path / "x", SIZE, Fraction(10)) as recorder:
+    with Recorder(tmp_path / "x", SIZE, rate=10, sink=sink) as recorder:
         for value in range(4):
             pixels[:] = value
             recorder.add(pixels)
@@ -90,7 +89,7 @@ def test_pictures_are_copied(tmp_path: Path) -> None:
 
 def test_what_the_encoder_met_is_raised_soon_and_at_the_end(tmp_path: Path) -> None:
     sink = Full()
-    recorder = Recorder.into(sink, tmp_path / "x", SIZE, Fraction(10))
+    recorder = Recorder(tmp_path / "x", SIZE, rate=10, sink=sink)
 
     def many() -> None:
         for _ in range(10 * MAX_WAITING_PICTURES):
@@ -101,7 +100,7 @@ def test_what_the_encoder_met_is_raised_soon_and_at_the_end(tmp_path: Path) -> N
         many()
     assert sink.aborted == 1
     recorder.close()
-    other = Recorder.into(Full(), tmp_path / "x", SIZE, Fraction(10))
+    other = Recorder(tmp_path / "x", SIZE, rate=10, sink=Full())
     for _ in range(3):
         other.add(BLACK)
     with pytest.raises(FormatError, match="No space left"):

@@ -60,7 +60,7 @@ def test_what_touches_the_ground_darkens_it_most() -> None:
     assert low.darkness.max() / 255 <= 1 - (1 - KEY_SHARE) * (1 - SKY_SHARE) + 0.01
 
 
-def test_a_shadow_is_reproducible_and_nothing_casts_none() -> None:
+def test_a_shadow_is_reproducible_and_nothing_casts_no_shadow() -> None:
     caster = ShadowCaster()
     mesh = ball(0.25, (0.3, 0.7, -0.2))
     first, again = caster.cast([mesh], (0.3, -0.2)), caster.cast([mesh], (0.3, -0.2))

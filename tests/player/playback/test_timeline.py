@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba_player.playback.timeline import BLOCK, Timeline
+from fba_player.playback.timeline import BLOCK_FRAMES, Timeline
 from player_tracks import body_track, face_track
 
 
@@ -41,21 +41,21 @@ def test_skipped_frames_take_their_time() -> None:
 
 
 def test_unsent_values_are_kept_in_any_order_of_asking() -> None:
-    frames: list[dict[int, int]] = [{} for _ in range(3 * BLOCK)]
-    frames[0], frames[2 * BLOCK + 5] = {3: 300, 4: 7}, {3: 500}
+    frames: list[dict[int, int]] = [{} for _ in range(3 * BLOCK_FRAMES)]
+    frames[0], frames[2 * BLOCK_FRAMES + 5] = {3: 300, 4: 7}, {3: 500}
     timeline = Timeline(face_animation(frames))
-    late, early = (3 * BLOCK - 1) / 25, (BLOCK + 3) / 25
+    late, early = (3 * BLOCK_FRAMES - 1) / 25, (BLOCK_FRAMES + 3) / 25
     for time, expected in ((late, 500), (early, 300), (late, 500), (0.0, 300)):
         assert timeline.faps(time)[2] == expected
         assert timeline.faps(time)[3] == 7
 
 
 def test_body_values_are_kept_and_interpolated() -> None:
-    frames: list[dict[int, int]] = [{} for _ in range(BLOCK + 4)]
-    frames[0], frames[BLOCK + 2], frames[BLOCK + 3] = {5: 1000}, {181: 80}, {5: 2000, 181: 80}
+    frames: list[dict[int, int]] = [{} for _ in range(BLOCK_FRAMES + 4)]
+    frames[0], frames[BLOCK_FRAMES + 2], frames[BLOCK_FRAMES + 3] = {5: 1000}, {181: 80}, {5: 2000, 181: 80}
     timeline = Timeline(Animation(Fraction(10), np.arange(len(frames)), body=body_track(frames)))
-    assert timeline.baps((BLOCK + 1) / 10)[4] == 1000
-    assert timeline.baps((BLOCK + 2.5) / 10)[[4, 180]] == pytest.approx([1500, 80])
+    assert timeline.baps((BLOCK_FRAMES + 1) / 10)[4] == 1000
+    assert timeline.baps((BLOCK_FRAMES + 2.5) / 10)[[4, 180]] == pytest.approx([1500, 80])
 
 
 def test_angles_go_the_shorter_way_round() -> None:
@@ -95,7 +95,7 @@ def test_between_frames_a_joint_turns_about_one_axis_nearly(turns: tuple[int, in
 
 @pytest.mark.parametrize("interpolate", [True, False])
 def test_many_times_at_once_are_the_same_as_one_by_one(interpolate: bool) -> None:
-    count = BLOCK + 30
+    count = BLOCK_FRAMES + 30
     faces = [{3: t % 70, 5: -t} if t % 3 else {} for t in range(count)]
     bodies = [{5: 50_000 * (t % 13), 181: t} if t % 4 else {} for t in range(count)]
     index = np.cumsum(np.arange(count) % 3 + 1)
@@ -110,7 +110,7 @@ def test_many_times_at_once_are_the_same_as_one_by_one(interpolate: bool) -> Non
         timeline.many([0.0, float("nan")])
 
 
-def test_ntsc_frames_are_found_by_their_own_times() -> None:
+def test_ntsc_frames_are_at_their_times() -> None:
     timeline = Timeline(face_animation([{3: t} for t in range(2000)], rate="30000/1001"))
     for frame in (0, 1, 777, 1999):
         assert timeline.position(float(timeline.time_of(frame)))[0] == frame

@@ -95,7 +95,7 @@ def test_without_loop_it_stops_on_the_last_frame_and_starts_again_from_there() -
     assert player.time == pytest.approx(0.0)
 
 
-def test_steps_go_to_the_frames_own_times_over_gaps() -> None:
+def test_steps_go_to_the_times_of_frames_over_gaps() -> None:
     player, clock = transport([0, 1, 7, 8])
     player.play()
     clock.now += 0.25  # between frames 1 and 2
@@ -287,7 +287,7 @@ def test_without_interpolation_the_frame_last_passed_is_held() -> None:
     assert player.time == pytest.approx(0.4)
 
 
-def test_timecode_is_the_streams_own() -> None:
+def test_timecode_is_that_of_the_stream() -> None:
     player, _ = transport([25 * 3661 + 24, 25 * 3662], rate=25)  # 1 h, 1 min, 1 s and 24 frames
     assert player.timecode() == "1:01:01:24"
     player.last()

@@ -49,7 +49,7 @@ def placement(surface: HeadSurface, tmp_path: Path) -> PointPlacement:
     return PointPlacement(surface, tmp_path / "out.csv")
 
 
-def test_points_that_every_face_needs_come_first_then_the_other_missing_ones(
+def test_points_that_every_face_needs_come_first_then_other_missing_points(
     placement: PointPlacement,
 ) -> None:
     needed = [name for name in FAPU_POINTS if name != "9.15"]

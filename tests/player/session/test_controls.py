@@ -57,7 +57,7 @@ def test_keys_set_and_clear_the_marks(controls: Controls) -> None:
     assert (transport.mark_in, transport.mark_out) == (None, None)
 
 
-def test_only_some_keys_go_on_while_held(controls: Controls) -> None:
+def test_only_some_keys_repeat_while_held(controls: Controls) -> None:
     assert controls.key("right", held=True)
     assert controls.session.transport.frame == 1
     assert not controls.key("space", held=True)

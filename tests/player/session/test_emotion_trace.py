@@ -11,9 +11,9 @@ from fba.emotion import Mood, emote
 from fba.emotion.recogniser import labels
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player.scene.scene import Scene
-from fba_player.session import _emotion_trace as emotion_trace
-from fba_player.session._emotion_trace import read_stretches, stretch_at
+from fba_player.session import _timeline_trace as timeline_trace
 from fba_player.session._source import Source
+from fba_player.session._timeline_trace import read_stretches, stretch_at
 
 
 def angry_for_a_while(first: int = 0) -> Animation:
@@ -38,11 +38,11 @@ def test_stretches_follow_each_other() -> None:
     assert stretch_at(found, 8.5) is None
 
 
-def test_without_a_face_and_for_long_ones_there_are_none(monkeypatch: object) -> None:
+def test_no_expressions_without_a_face_and_for_long_animations(monkeypatch: object) -> None:
     body = BodyTrack(np.zeros((3, 296), dtype=np.int32), np.ones((3, 296), dtype=bool))
     assert read_stretches(Animation(25, np.arange(3), None, body), None) == ()
     face = angry_for_a_while()
-    monkeypatch.setattr(emotion_trace, "MAX_FRAMES", 100)  # type: ignore[attr-defined]
+    monkeypatch.setattr(timeline_trace, "MAX_READ_FRAMES", 100)  # type: ignore[attr-defined]
     assert read_stretches(face, None) == ()
 
 

@@ -157,7 +157,7 @@ def test_a_take_of_a_face_has_no_body() -> None:
         ("121", "25"),
     ],
 )
-def test_the_rate_is_the_streams_where_it_is_one_for_motion(rate: str, wanted: str) -> None:
+def test_a_take_has_the_rate_of_the_stream_within_limits(rate: str, wanted: str) -> None:
     assert take_rate(Fraction(rate)) == Fraction(wanted)
 
 

@@ -14,7 +14,7 @@ from fba_player.playback.transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._captures import Captures
 from fba_player.session._session import Session
-from fba_player.sound._recorded_sound import FilmSound
+from fba_player.sound.soundtrack import FilmSound
 from player_tracks import face_track
 from set_clock import Clock
 from sound_clicks import click_time, sound, write_click

@@ -9,7 +9,7 @@ import pytest
 
 from fba.animation import Animation
 from fba.codec import StreamInfo
-from fba_player._ui.panels._bit_rates import bars_of_planes, measure_rates, probe_encoded
+from fba_player._ui.panels._rate_panel import bars_of_planes, measure_rates, probe_encoded
 
 
 def info(bits: list[int], intra: list[int], index: list[int] | None = None, size: int = 0) -> StreamInfo:
@@ -39,7 +39,7 @@ def test_frames_that_were_skipped_take_time_and_no_bits() -> None:
     assert found.rate[-2:] == pytest.approx([0.1, 0.3])
 
 
-def test_rates_of_one_plane_and_of_none() -> None:
+def test_rates_of_one_plane_and_of_no_plane() -> None:
     found = measure_rates(info([1000], [0]))
     assert found is not None
     assert found.rate.tolist() == [1.0]
@@ -64,6 +64,8 @@ def test_what_a_performance_would_be_as_a_stream(talking: Animation) -> None:
     assert found.frames == 10
 
 
-def test_long_ones_are_not_encoded_only_to_see(talking: Animation, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fba_player._ui.panels._bit_rates.MAX_VALUES", 29)  # it has thirty
+def test_long_animations_are_not_encoded_to_be_measured(
+    talking: Animation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fba_player._ui.panels._rate_panel.MAX_VALUES", 29)  # it has thirty
     assert probe_encoded(talking) is None

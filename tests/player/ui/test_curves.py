@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from fba.animation import Animation, FaceTrack
 from fba.parameters import faps
-from fba_player._ui.panels._curve_data import BLOCK, MIN_SHOWN_SECONDS, Courses, TimeZoom, amount, envelope
+from fba_player._ui.panels._curve_data import (
+    MIN_SHOWN_SECONDS,
+    RESOLVED_AT_ONCE,
+    Courses,
+    TimeZoom,
+    amount,
+    envelope,
+)
 from fba_player._ui.panels._curves_panel import search_parameters
 from fba_player.playback.timeline import Timeline
 from player_tracks import body_track, face_track
@@ -48,14 +55,14 @@ def long_face(frames: int) -> Animation:
 
 
 def test_an_hour_is_worked_out_piece_by_piece() -> None:
-    courses = Courses(Timeline(long_face(3 * BLOCK + 5)))
+    courses = Courses(Timeline(long_face(3 * RESOLVED_AT_ONCE + 5)))
     assert courses.advance()
     assert 0.3 < courses.resolved_share < 0.34
-    assert len(courses.course("fap", 3).values) == BLOCK
+    assert len(courses.course("fap", 3).values) == RESOLVED_AT_ONCE
     complete(courses)
     assert courses.resolved_share == 1.0
     course = courses.course("fap", 3)
-    np.testing.assert_array_equal(course.values, np.arange(3 * BLOCK + 5) % 1001)
+    np.testing.assert_array_equal(course.values, np.arange(3 * RESOLVED_AT_ONCE + 5) % 1001)
 
 
 def test_courses_grow_as_frames_arrive() -> None:
@@ -70,7 +77,7 @@ def test_courses_grow_as_frames_arrive() -> None:
     assert course.times[-1] == pytest.approx(99 / 25 + 2.0)
 
 
-def test_those_that_move_most_come_first_and_only_one_of_mates() -> None:
+def test_parameters_that_move_most_come_first_and_one_of_mates() -> None:
     face = face_track([{3: 0, 31: 0, 32: 0, 49: 0}, {3: 400, 31: 240, 32: 240, 49: 4500}])
     body = body_track([{32: 0, 181: 0}, {32: 157080, 181: 30}])  # 90 degrees, and 3 cm
     courses = complete(Courses(Timeline(Animation(25, np.arange(2), face, body))))  # type: ignore[arg-type]

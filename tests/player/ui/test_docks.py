@@ -84,7 +84,7 @@ def test_the_least_recently_used_panel_is_folded() -> None:
     assert apart(again)
 
 
-def test_closing_one_gives_its_room_to_the_others() -> None:
+def test_closing_a_panel_gives_its_room_to_the_others() -> None:
     docks = Docks()
     requests = [request(name, height=400, least=200) for name in "abcdef"]
     found = docks.arrange(requests, 1280, TOP, 530)

@@ -192,7 +192,7 @@ def test_the_bit_rate_of_what_is_no_stream_yet(opened: Opened, talking: Animatio
 def test_pictures_go_on_until_all_curves_are_known(
     opened: Opened, talking: Animation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fba_player._ui.panels._curve_data.BLOCK", 1)
+    monkeypatch.setattr("fba_player._ui.panels._curve_data.RESOLVED_AT_ONCE", 1)
     studio = opened(talking, "curves")
     session = studio.session
     assert session.restless

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel, Part
-from fba_player._figure._eyeball import find_eyeball
 from fba_player._figure._face_parts import find_hairs
+from fba_player._figure.face import find_eyeball
 from fba_player._mesh.primitives import sphere_mesh
 from fba_player.gl._antialias_region import bounding_rectangles
 from fba_player.gl._silhouette import TILE, Outliner

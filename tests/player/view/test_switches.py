@@ -17,8 +17,8 @@ from fba.face.model import FaceModel, point_row
 from fba.player import Camera, Offscreen, Scene
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player.gl._labels import place_names
+from fba_player.scene._display_options import unique_edges
 from fba_player.scene._fap_heatmap import FapHeatmap
-from fba_player.scene._wireframe import unique_edges
 from fba_player.scene.scene import SWITCHES
 from fba_player.view.switches import Switches, parse_switch
 from player_tracks import body_track, face_track
@@ -47,7 +47,7 @@ def figure() -> FaceFigure:
 def shown(subject: Animation, view: str = "figure") -> Scene:
     """A scene whose face need not be made anew."""
     scene = Scene(subject, only_figure().model, view=view)
-    scene._figure = only_figure()
+    scene.__dict__["figure"] = only_figure()
     return scene
 
 
@@ -188,7 +188,7 @@ class TestViews:
         np.testing.assert_array_equal(glass.capsules, alone.capsules)
         assert "skin" in {mesh.shape.kind for mesh in glass.extras.shells}  # type: ignore[union-attr]
 
-    def test_a_faces_own_joints_are_what_it_turns_about(self) -> None:
+    def test_a_face_turns_about_its_joints(self) -> None:
         scene = shown(face({49: 30000}))
         scene.show("skeleton", "only")
         places = scene.view_at(0.0).capsules[2:, :3]
@@ -292,7 +292,7 @@ class TestNames:
             _, corners = place_names(np.array([[x, 50.0]]), sizes, 0.0, (200, 100))
             assert corners.tolist() == [[left, 38.0]]
 
-    def test_with_many_points_in_view_none_is_named(self) -> None:
+    def test_with_many_points_in_view_no_point_is_named(self) -> None:
         dots = np.stack(np.meshgrid(np.arange(10) * 40.0, np.arange(10) * 40.0), axis=-1).reshape(-1, 2)
         assert len(place_names(dots, np.full((100, 2), 10), 3.0, (400, 400))[0]) == 0
 

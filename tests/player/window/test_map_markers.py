@@ -27,7 +27,7 @@ from small_head import small_head
 glfw = graphics.imported("glfw")
 graphics.imported("imgui_bundle")
 
-from fba_player.window.map_markers import check_window, open_markers  # noqa: E402
+from fba_player.window.pages import check_page, open_markers  # noqa: E402
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (900, 560)
@@ -274,7 +274,7 @@ def test_without_a_display_it_says_how_to_do_without(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("DISPLAY", ":990")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(DisplayError, match=r"no window can be opened.*-o FILE.png"):
-        check_window()
+        check_page("markers")
     monkeypatch.setitem(sys.modules, "imgui_bundle", None)
     with pytest.raises(DisplayError, match=r"imgui.*-o FILE.png"):
-        check_window()
+        check_page("markers")

@@ -24,7 +24,7 @@ from small_head import small_head
 glfw = graphics.imported("glfw")
 graphics.imported("imgui_bundle")
 
-from fba_player.window.place_points import check_window, open_placement  # noqa: E402
+from fba_player.window.pages import check_page, open_placement  # noqa: E402
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (640, 480)
@@ -158,7 +158,7 @@ def test_keys_work_through_the_points(on_display: str, surface: HeadSurface, tmp
 
 
 def test_an_unwritable_file_is_said_in_the_window(surface: HeadSurface, tmp_path: Path) -> None:
-    from fba_player.session._placing import PLACING
+    from fba_player.session._pages import PLACING
 
     placement = PointPlacement(surface, tmp_path / "nowhere" / "points.csv")
     session = Session(PlacementScene(placement), size=SIZE)
@@ -172,7 +172,7 @@ def test_without_a_display_the_file_s_format_is_told(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("DISPLAY", ":990")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(DisplayError, match=r"no window can be opened.*lines 'name,vertex'.*'name,x,y,z'"):
-        check_window()
+        check_page("points")
     monkeypatch.setitem(sys.modules, "imgui_bundle", None)
     with pytest.raises(DisplayError, match=r"imgui.*lines 'name,vertex'"):
-        check_window()
+        check_page("points")

@@ -87,7 +87,7 @@ def test_something_is_shown_before_anything_is_prepared(
     assert not (first[:200].min(axis=2) > 200).any()
 
 
-def test_the_plain_one_shows_the_face_and_the_timeline(plain: Window) -> None:
+def test_the_plain_window_shows_the_face_and_the_timeline(plain: Window) -> None:
     picture = shown(plain)
     assert (picture[80:120, 140:180, 0] - picture[80:120, 140:180, 2]).mean() > 25
     assert picture[190:].mean() < picture[:40].mean()
@@ -254,7 +254,7 @@ def test_files_dropped_onto_it_are_handed_on(window: Window, talking: Animation,
     assert window.session.dropped == (good,)
 
 
-def test_the_windows_own_button_asks_where_something_is_not_saved(window: Window) -> None:
+def test_the_close_button_of_the_window_asks_if_work_is_unsaved(window: Window) -> None:
     window.session.unsaved.add("the last take")
     glfw.set_window_should_close(window._window, True)
     assert window.update()

@@ -13,7 +13,7 @@ from fba.face.resolve import FaceSettings
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, bap_numbers, baps, faps
 from fba_player._ui.panels._puppet_rows import reach
 
-BLOCK = 512
+RESOLVED_AT_ONCE = 512
 """Frames of a face resolved at once: about two milliseconds."""
 FILLED_IN_WEIGHT = 0.5
 """Weight of a FAP that is only filled in, where 1 is that of a FAP that is sent."""
@@ -56,23 +56,19 @@ class Courses:
         self._resolver = Resolver(model)
         self._shown: Float32 = np.zeros((0, FAP_COUNT), np.float32)
         self._done = 0
-        self._bodies = 0
         self._times: Float64 = np.zeros(0)
         self._courses: dict[tuple[str, int], Course] = {}
 
     @property
     def has_face(self) -> bool:
-        """Whether the timeline has FAPs."""
         return self._timeline.animation.face is not None
 
     @property
     def has_body(self) -> bool:
-        """Whether the timeline has BAPs."""
         return self._timeline.animation.body is not None
 
     @property
     def resolved_share(self) -> float:
-        """Share of the frames whose FAPs have been resolved."""
         return self._done / max(self._timeline.frames, 1) if self.has_face else 1.0
 
     def advance(self, blocks: int = 1) -> bool:
@@ -92,7 +88,7 @@ class Courses:
             grown[: self._done] = self._shown[: self._done]
             self._shown = grown
         for _ in range(blocks):
-            stop = min(self._done + BLOCK, frames)
+            stop = min(self._done + RESOLVED_AT_ONCE, frames)
             if stop > self._done:
                 self._shown[self._done : stop] = self._resolver.push(animation.face[self._done : stop])
                 self._done = stop
@@ -107,8 +103,7 @@ class Courses:
         return self._courses[key]
 
     def movers(self, count: int) -> list[tuple[str, int]]:
-        """Return (kind, number) of the parameters that move most, relative to their typical motion; the most
-        first.
+        """Return (kind, number) of the parameters that move most, relative to typical motion, in order.
 
         Of FAPs that mirror each other, only one.
         """
@@ -129,7 +124,7 @@ class Courses:
             for number in range(1, BAP_COUNT + 1):
                 span_here = max(float(high[number - 1]) - float(low[number - 1]), 0.0)
                 spans.append((span_here / bap_reach(number), "bap", number))
-        spans.sort(key=lambda one: (-one[0], one[1:]))
+        spans.sort(key=lambda span: (-span[0], span[1:]))
         movers: list[tuple[str, int]] = []
         for span_here, kind, number in spans:
             if span_here > 0 and not _is_mate(kind, number, movers):
@@ -139,14 +134,14 @@ class Courses:
     def _fap(self, number: int) -> Course:
         face, done = self._timeline.animation.face, self._done
         if face is None:
-            return _empty_course("fap", number)
+            return Course("fap", number, np.zeros(0), np.zeros(0), np.zeros(0, bool))
         values = self._shown[:done, number - 1].astype(np.float64)
         return Course("fap", number, self._times[:done], values, np.asarray(face.mask[:done, number - 1]))
 
     def _bap(self, number: int) -> Course:
         body, frames = self._timeline.animation.body, len(self._times)
         if body is None:
-            return _empty_course("bap", number)
+            return Course("bap", number, np.zeros(0), np.zeros(0), np.zeros(0, bool))
         sent = np.asarray(body.mask[:frames, number - 1])
         values = np.asarray(body.values[:frames, number - 1]).astype(np.float64)
         if not sent.all():  # each frame shows the value that was sent last
@@ -170,10 +165,9 @@ def amount(kind: str, number: int, value: float) -> tuple[str, str]:
 
 def bap_reach(number: int) -> float:
     """Return the typical strong motion of a BAP, in its unit."""
-    shift = baps()[number - 1].unit == "mm"
-    root = number >= bap_numbers()["HumanoidRoot_tr_vertical"]
-    if shift:
+    if baps()[number - 1].unit == "mm":
         return TYPICAL_SHIFT
+    root = number >= bap_numbers()["HumanoidRoot_tr_vertical"]
     return float(np.radians(TYPICAL_ANGLE * (2 if root else 1)) * 1e5)
 
 
@@ -185,10 +179,6 @@ def _is_mate(kind: str, number: int, others: list[tuple[str, int]]) -> bool:
     mates = {fap.left_right_mate, fap.lip_mate} - {None}
     mates |= {faps()[mate - 1].left_right_mate for mate in mates if mate is not None}
     return any(("fap", mate) in others for mate in mates)
-
-
-def _empty_course(kind: str, number: int) -> Course:
-    return Course(kind, number, np.zeros(0), np.zeros(0), np.zeros(0, bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,9 +209,8 @@ def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: floa
         part = slice(max(int(first) - 1, 0), min(int(last) + 1, len(times)))
         return Envelope((times[part] - low) / (high - low), values[part], sent[part])
     edges = np.searchsorted(times, np.linspace(low, high, columns + 1)[:-1], side="left")
-    starts, column_of = np.unique(
-        edges, return_index=True
-    )  # of columns that begin at the same frame, the last has it
+    # Of columns that begin at the same frame, the last has it.
+    starts, column_of = np.unique(edges, return_index=True)
     column_of = np.r_[column_of[1:] - 1, columns - 1]
     in_range = starts < last
     starts, column_of = starts[in_range], column_of[in_range]
@@ -245,7 +234,6 @@ class TimeZoom:
 
     @property
     def shows_all(self) -> bool:
-        """Whether the full range is shown."""
         return self.low <= self.first + TIME_TOLERANCE and self.high >= self.last - TIME_TOLERANCE
 
     def bound(self, first: float, last: float) -> None:
@@ -260,7 +248,6 @@ class TimeZoom:
             self._set(self.low, self.high)
 
     def reset(self) -> None:
-        """Show the full range."""
         self.low, self.high = self.first, self.last
 
     def zoom(self, factor: float, about: float) -> None:

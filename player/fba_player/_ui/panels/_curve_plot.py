@@ -22,9 +22,9 @@ COLOURS: tuple[theme.Colour, ...] = (
 )  # fmt: skip
 LABEL_HEIGHT = 19.0
 """Height in points of the name and values above a curve."""
-CURVE = 36.0
+CURVE_HEIGHT = 36.0
 """Height in points of a curve."""
-GAP = 7.0
+LANE_GAP = 7.0
 """Points between two curves."""
 AXIS = 22.0
 """Height in points of the time labels below the curves."""
@@ -92,13 +92,13 @@ class Lanes:
         visible = imgui.get_window_pos().y, imgui.get_window_pos().y + imgui.get_window_height()
         y = top
         for number, lane in enumerate(lanes):
-            if y + LABEL_HEIGHT + CURVE >= visible[0] and y <= visible[1]:
+            if y + LABEL_HEIGHT + CURVE_HEIGHT >= visible[0] and y <= visible[1]:
                 self._lane(session, lane, ruler, time_zoom, y, now.get(lane.key))
             if number == 0:
-                self.area = (left, y + LABEL_HEIGHT, left + wide, y + LABEL_HEIGHT + CURVE)
-            y += LABEL_HEIGHT + CURVE + GAP
+                self.area = (left, y + LABEL_HEIGHT, left + wide, y + LABEL_HEIGHT + CURVE_HEIGHT)
+            y += LABEL_HEIGHT + CURVE_HEIGHT + LANE_GAP
         imgui.set_cursor_screen_pos((left, top))
-        imgui.dummy((1, max(y - top - GAP, 1)))
+        imgui.dummy((1, max(y - top - LANE_GAP, 1)))
         imgui.end_child()
         imgui.pop_style_var(2)
         bottom = imgui.get_cursor_screen_pos().y
@@ -115,27 +115,25 @@ class Lanes:
         wide = right - left
         imgui.set_cursor_screen_pos((left, top))
         name = f"lane{lane.course.kind}{lane.course.number}"
-        imgui.invisible_button(name, (max(wide, 1), CURVE), EITHER_BUTTON)
+        imgui.invisible_button(name, (max(wide, 1), CURVE_HEIGHT), EITHER_BUTTON)
         hovered = imgui.is_item_hovered()
         _mouse(session, ruler, time_zoom, hovered=hovered, active=imgui.is_item_active())
-        to.add_rect_filled((left, top), (right, top + CURVE), theme.packed((0, 0, 0, 0.22)), rounding=3.0)
+        to.add_rect_filled((left, top), (right, top + CURVE_HEIGHT), theme.packed(theme.HOLLOW), rounding=3.0)
         lines = self._points(lane, ruler, time_zoom)
         corner = imgui.ImVec2(left, top)
         if lines.zero is not None:
             zero = top + lines.zero
             to.add_line((left, zero), (right, zero), theme.packed(theme.TEXT, 0.13))
-        to.push_clip_rect((left, top - 1), (right, top + CURVE + 1), True)
+        to.push_clip_rect((left, top - 1), (right, top + CURVE_HEIGHT + 1), True)
         colour = _darken(lane.colour) if lines.dense else lane.colour
-        if lines.all_sent:
-            _line(to, lines.points, corner, colour, 1.0, SENT_WIDTH)
-        else:
-            _line(to, lines.points, corner, colour, 0.5, FILLED_IN_WIDTH)
-            for run in lines.runs:
-                _line(to, run, corner, colour, 1.0, SENT_WIDTH)
+        if not lines.all_sent:
+            _line(to, lines.points, corner, theme.packed(colour, 0.5), FILLED_IN_WIDTH)
+        for run in [lines.points] if lines.all_sent else lines.runs:
+            _line(to, run, corner, theme.packed(colour), SENT_WIDTH)
         to.pop_clip_rect()
         at = ruler.x(session.transport.time)
         if time_zoom.low <= session.transport.time <= time_zoom.high:
-            to.add_line((at, top), (at, top + CURVE), theme.packed(theme.TEXT, 0.8))
+            to.add_line((at, top), (at, top + CURVE_HEIGHT), theme.packed(theme.TEXT, 0.8))
         self._draw_label(to, lane, lines, ruler, y, now)
         if hovered:
             _hover(to, lane, ruler, top)
@@ -143,17 +141,16 @@ class Lanes:
     def _points(self, lane: Lane, ruler: Ruler, time_zoom: TimeZoom) -> _Lines:
         wide = ruler.right - ruler.left
         key = (lane.course, time_zoom.low, time_zoom.high, wide)
-        known = self._lines.get(lane.key)
-        if known is not None and known.made_for == key:
-            return known
+        before = self._lines.get(lane.key)
+        if before is not None and before.made_for == key:
+            return before
         course = lane.course
-        low, high = (
-            (float(course.values.min()), float(course.values.max())) if len(course.values) else (0.0, 0.0)
+        shown = (time_zoom.low, time_zoom.high, max(int(wide), 1))
+        points = envelope(course.times, course.values, course.sent, *shown)
+        values = course.values if len(course.values) else np.zeros(1)
+        lines = self._lines[lane.key] = _make_lines(
+            points, key, float(values.min()), float(values.max()), wide
         )
-        points = envelope(
-            course.times, course.values, course.sent, time_zoom.low, time_zoom.high, max(int(wide), 1)
-        )
-        lines = self._lines[lane.key] = _make_lines(points, key, low, high, wide)
         return lines
 
     def _draw_label(
@@ -204,7 +201,7 @@ def _mouse(session: Session, ruler: Ruler, time_zoom: TimeZoom, *, hovered: bool
 def _hover(to: imgui.ImDrawList, lane: Lane, ruler: Ruler, top: float) -> None:
     """Show the time under the mouse, and the value there."""
     x = min(max(imgui.get_io().mouse_pos.x, ruler.left), ruler.right)
-    to.add_line((x, top), (x, top + CURVE), theme.packed(theme.TEXT, 0.35))
+    to.add_line((x, top), (x, top + CURVE_HEIGHT), theme.packed(theme.TEXT, 0.35))
     if imgui.is_mouse_down(0) or not len(lane.course.times):
         return
     time = ruler.time(x)
@@ -215,7 +212,7 @@ def _hover(to: imgui.ImDrawList, lane: Lane, ruler: Ruler, top: float) -> None:
 def _make_lines(curve: Envelope, key: tuple[object, ...], low: float, high: float, wide: float) -> _Lines:
     """Convert values to points; their range fills the height of the lane."""
     room = high - low or 1.0
-    inner = CURVE - 6
+    inner = CURVE_HEIGHT - 6
 
     def y(values: np.ndarray) -> np.ndarray:
         share = np.full(len(values), 0.5) if high == low else (values - low) / room
@@ -248,17 +245,12 @@ def _widen(points: list[imgui.ImVec2]) -> list[imgui.ImVec2]:
 
 
 def _line(
-    to: imgui.ImDrawList,
-    points: list[imgui.ImVec2],
-    corner: imgui.ImVec2,
-    colour: theme.Colour,
-    alpha: float,
-    thickness: float,
+    to: imgui.ImDrawList, points: list[imgui.ImVec2], corner: imgui.ImVec2, colour: int, thickness: float
 ) -> None:
     if len(points) < 2:
         return
     first = to.vtx_buffer.size()
-    to.add_polyline(cast(Any, points), theme.packed(colour, alpha), thickness, 0)
+    to.add_polyline(cast(Any, points), colour, thickness, 0)
     # The points are reused in each picture: the position of the lane is added to their vertices.
     shade = imgui.internal.shade_verts_transform_pos
     shade(to, first, to.vtx_buffer.size(), imgui.ImVec2(0, 0), 1.0, 0.0, corner)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache, partial
 from typing import Any
 
 from imgui_bundle import imgui
 
-from fba.parameters import BAP_STANDARD_COUNT, FIRST_LOW_LEVEL_FAP, baps, faps
+from fba.parameters import BAP_STANDARD_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, baps, faps
 from fba_player._ui import theme
 from fba_player._ui.panels._curve_data import Courses, TimeZoom, amount, parameter
 from fba_player._ui.panels._curve_plot import COLOURS, Lane, Lanes
@@ -43,19 +44,15 @@ class CurvesPanel(Panel):
         self.chooser = Chooser()
 
     def available(self, session: Session) -> bool:
-        """Return whether the scene has FAPs or BAPs."""
         return _timeline(session) is not None
 
     def draw(self, session: Session) -> None:
-        """Draw the content."""
         names = session.scene.names if isinstance(session.scene, CompareScene) else ()
         if len(names) > 1:
             self.which = choose_name("##which", names, min(self.which, len(names) - 1))
         all_courses = self._update_courses(session)
-        transport = session.transport
-        self.time_zoom.bound(
-            transport.start, float(session.scene.timeline.time_of(session.scene.timeline.frames - 1))
-        )
+        timeline = session.scene.timeline
+        self.time_zoom.bound(session.transport.start, float(timeline.time_of(timeline.frames - 1)))
         self._tools(session, all_courses)
         chosen = [("fap", n) for n in session.selection.faps] + [("bap", n) for n in session.selection.baps]
         if not chosen:
@@ -68,7 +65,6 @@ class CurvesPanel(Panel):
         self.lanes.draw(session, self._lanes, self.time_zoom, _now(session, chosen, self.which))
 
     def closed(self, session: Session) -> None:
-        """Stop asking for pictures; computed courses stay."""
         session.rolling.discard(self.name)
 
     def _update_courses(self, session: Session) -> Courses:
@@ -146,13 +142,14 @@ def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tu
 @cache
 def all_parameters() -> tuple[tuple[str, int, str, str], ...]:
     """Return (kind, number, text shown, text searched) of all parameters, FAPs first."""
-    rows = []
-    for fap in faps()[FIRST_LOW_LEVEL_FAP - 1 :]:
-        searched = f"fap {fap.number} {fap.name} {fap.name.replace('_', ' ')} {fap.group_name}".lower()
-        rows.append(("fap", fap.number, f"{fap.number} {fap.name}", searched))
-    for bap in baps()[:BAP_STANDARD_COUNT]:
-        searched = f"bap {bap.number} {bap.name} {bap.name.replace('_', ' ')} {bap.group_name}".lower()
-        rows.append(("bap", bap.number, f"{bap.number} {bap.name}", searched))
+    rows: list[tuple[str, int, str, str]] = []
+    listed: list[tuple[str, Sequence[Fap | Bap]]] = [
+        ("fap", faps()[FIRST_LOW_LEVEL_FAP - 1 :]), ("bap", baps()[:BAP_STANDARD_COUNT]),
+    ]  # fmt: skip
+    for kind, parameters in listed:
+        for row in parameters:
+            searched = f"{kind} {row.number} {row.name} {row.name.replace('_', ' ')} {row.group_name}"
+            rows.append((kind, row.number, f"{row.number} {row.name}", searched.lower()))
     return tuple(rows)
 
 
@@ -160,13 +157,11 @@ def all_parameters() -> tuple[tuple[str, int, str, str], ...]:
 def search_parameters(query: str, *, face: bool, body: bool) -> tuple[tuple[str, int, str], ...]:
     """Return (kind, number, text) of parameters that match all words: a number, or parts of name or group."""
     words = query.lower().split()
-    rows = []
-    for kind, number, text, searched in all_parameters():
-        if not (face if kind == "fap" else body):
-            continue
-        if all(_matches(word, number, searched) for word in words):
-            rows.append((kind, number, text))
-    return tuple(rows)
+    return tuple(
+        (kind, number, text)
+        for kind, number, text, searched in all_parameters()
+        if (face if kind == "fap" else body) and all(_matches(word, number, searched) for word in words)
+    )
 
 
 def _matches(word: str, number: int, searched: str) -> bool:
@@ -224,7 +219,7 @@ class Chooser:
 
 def _group(kind: str, number: int) -> None:
     """Draw the kind and group of a parameter at the right end of its row."""
-    name = (faps() if kind == "fap" else baps())[number - 1].group_name.partition(",")[0]
+    name = parameter(kind, number).group_name.partition(",")[0]
     text = f"{kind.upper()} {name}"
     font, size = imgui.get_font(), theme.SMALL
     right = imgui.get_window_pos().x + imgui.get_content_region_avail().x

@@ -10,16 +10,16 @@ from imgui_bundle import imgui, implot
 
 from fba.arrays import Float64
 from fba_player._ui import theme
-from fba_player._ui.panels.panel import Panel, choose_name, heading, tooltip
+from fba_player._ui.panels.panel import Panel, choose_by_button, choose_name, heading, tooltip
 from fba_player.scene._differences import Differences, Largest
-from fba_player.scene.compare import ARRANGEMENTS, CompareScene
+from fba_player.scene.compare import CompareScene
 from fba_player.session._session import Session
 
-ROWS = 9
+LISTED_PARAMETERS = 9
 """Number of parameters listed: those that differ most."""
-POINTS = 1500
+MAX_CURVE_POINTS = 1500
 """Most points of a curve; longer ones are thinned to the largest value of each part."""
-ARRANGEMENT_LABELS = {"side": "side by side", "over": "over each other"}
+ARRANGEMENTS = {"side": "side by side", "over": "over each other"}
 DEGREES = 180 / np.pi * 1e-5
 
 
@@ -36,11 +36,9 @@ class DifferencesPanel(Panel):
         self._curve: tuple[object, Float64, Float64] | None = None
 
     def available(self, session: Session) -> bool:
-        """Return whether several animations are compared."""
         return isinstance(session.scene, CompareScene) and len(session.scene.scenes) > 1
 
     def draw(self, session: Session) -> None:
-        """Draw the content."""
         scene: Any = session.scene
         self._arrangement(session, scene)
         self._second = min(self._second, len(scene.scenes) - 1)
@@ -48,25 +46,23 @@ class DifferencesPanel(Panel):
             self._second = 1 + choose_name("##second", scene.names[1:], self._second - 1)
         differences = scene.differences(self._second)
         if self._known is None or self._known[0] is not differences:
-            self._known = (differences, differences.largest(ROWS))
+            self._known = (differences, differences.largest(LISTED_PARAMETERS))
         largest = self._known[1]
         heading(f"{_short(scene.names[self._second])} minus {_short(scene.names[0])}", exact=True)
         if not largest:
             imgui.text_colored(theme.FAINT, _why_nothing_differs(scene, self._second, differences))
             return
-        if self._chosen not in [(one.kind, one.number) for one in largest]:
+        if self._chosen not in [(item.kind, item.number) for item in largest]:
             self._chosen = (largest[0].kind, largest[0].number)
         self._table(session, largest)
-        chosen = next(one for one in largest if (one.kind, one.number) == self._chosen)
+        chosen = next(item for item in largest if (item.kind, item.number) == self._chosen)
         self._plot(session, differences, chosen)
 
     def _arrangement(self, session: Session, scene: Any) -> None:
-        for number, name in enumerate(ARRANGEMENTS):
-            if number:
-                imgui.same_line()
-            if imgui.radio_button(ARRANGEMENT_LABELS[name], scene.arrangement == name):
-                scene.arrangement = name
-                session.viewpoint.reset()
+        arrangement = choose_by_button(ARRANGEMENTS, scene.arrangement)
+        if arrangement is not None:
+            scene.arrangement = arrangement
+            session.viewpoint.reset()
 
     def _table(self, session: Session, largest: list[Largest]) -> None:
         flags = imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.row_bg | imgui.TableFlags_.pad_outer_x
@@ -76,17 +72,16 @@ class DifferencesPanel(Panel):
         for title in ("most", "rms", "unit"):
             imgui.table_setup_column(title)
         imgui.table_headers_row()
-        for one in largest:
+        for item in largest:
             imgui.table_next_row()
             imgui.table_next_column()
-            chosen = (one.kind, one.number) == self._chosen
-            if imgui.selectable(
-                f"{one.number} {one.name}##{one.kind}", chosen, imgui.SelectableFlags_.span_all_columns
-            )[0]:
-                self._chosen = (one.kind, one.number)
-                session.transport.seek(one.time)
-            tooltip(f"{one.kind.upper()} {one.number}: shows its course, and goes to where it differs most")
-            for text in (f"{one.most:.0f}", f"{one.rms:.1f}", _unit(one.unit, one.most)):
+            chosen = (item.kind, item.number) == self._chosen
+            whole_row = imgui.SelectableFlags_.span_all_columns
+            if imgui.selectable(f"{item.number} {item.name}##{item.kind}", chosen, whole_row)[0]:
+                self._chosen = (item.kind, item.number)
+                session.transport.seek(item.time)
+            tooltip(f"{item.kind.upper()} {item.number}: shows its course, and goes to where it differs most")
+            for text in (f"{item.most:.0f}", f"{item.rms:.1f}", _unit(item.unit, item.most)):
                 imgui.table_next_column()
                 imgui.text_colored(theme.TEXT if chosen else theme.FAINT, text)
         imgui.end_table()
@@ -94,11 +89,9 @@ class DifferencesPanel(Panel):
     def _plot(self, session: Session, differences: Differences, chosen: Largest) -> None:
         key = (differences, self._chosen)
         if self._curve is None or self._curve[0] != key:
-            values = differences.faps if chosen.kind == "fap" else differences.baps
-            self._curve = (
-                key,
-                *thin_curve(differences.times, values[:, chosen.number - 1].astype(np.float64), POINTS),
-            )
+            table = differences.faps if chosen.kind == "fap" else differences.baps
+            values = table[:, chosen.number - 1].astype(np.float64)
+            self._curve = (key, *thin_curve(differences.times, values, MAX_CURVE_POINTS))
         _, times, values = self._curve
         imgui.dummy((0, 2))
         implot.push_style_color(implot.Col_.frame_bg, (0, 0, 0, 0))
@@ -126,9 +119,9 @@ class DifferencesPanel(Panel):
 
 def _why_nothing_differs(scene: Any, second: int, differences: Differences) -> str:
     """Return the text shown where nothing differs: the reason."""
-    one, other = (scene.scenes[number].animation for number in (0, second))
-    both_faces = one.face is not None and other.face is not None
-    both_bodies = one.body is not None and other.body is not None
+    first, other = (scene.scenes[number].animation for number in (0, second))
+    both_faces = first.face is not None and other.face is not None
+    both_bodies = first.body is not None and other.body is not None
     if not (both_faces or both_bodies):
         return "one is a face, the other a body: nothing to compare"
     return "nothing differs" if len(differences.times) else "they have no time in common"
@@ -138,10 +131,8 @@ def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Flo
     """Return a curve of at most `most` points: of each part, the value furthest from 0 at its time."""
     if len(times) <= most:
         return times, values
-    borders = np.linspace(0, len(times), most + 1).astype(int)
-    rows = np.array(
-        [low + int(np.abs(values[low:high]).argmax()) for low, high in pairwise(borders.tolist())]
-    )
+    borders = np.linspace(0, len(times), most + 1).astype(int).tolist()
+    rows = [low + int(np.abs(values[low:high]).argmax()) for low, high in pairwise(borders)]
     return times[rows], values[rows]
 
 

@@ -6,11 +6,10 @@ import os
 from typing import Any
 
 import numpy as np
-from imgui_bundle import imgui
 
 from fba.codec import PartInfo, StreamInfo
 from fba_player._ui import theme
-from fba_player._ui.panels.panel import Panel, facts, heading
+from fba_player._ui.panels.panel import Panel, facts, heading, wrapped
 from fba_player.playback.timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.session._session import Session
@@ -27,7 +26,6 @@ class FilePanel(Panel):
         self._shown: tuple[StreamInfo, list[tuple[str, list[tuple[str, str]]]]] | None = None
 
     def draw(self, session: Session) -> None:
-        """Draw the content."""
         source, info = session.source, session.source.info
         if self._shown is None or self._shown[0] is not info:
             self._shown = (info, _sections(session, info))
@@ -35,17 +33,13 @@ class FilePanel(Panel):
             if title:
                 heading(title, exact=title[0].isdigit())
             facts(title or "file", rows)
-        troubles = [*source.warnings, *(str(one.error) for one in info.damage)]
+        troubles = [*source.warnings, *(str(lost.error) for lost in info.damage)]
         if troubles:
             heading("Warnings")
-            imgui.push_style_color(imgui.Col_.text, theme.WARM)
-            imgui.push_text_wrap_pos(0.0)
             for text in troubles[:20]:
-                imgui.text_unformatted(text)
+                wrapped(text, theme.WARM)
             if len(troubles) > 20:
-                imgui.text_unformatted(f"and {len(troubles) - 20} more")
-            imgui.pop_text_wrap_pos()
-            imgui.pop_style_color()
+                wrapped(f"and {len(troubles) - 20} more", theme.WARM)
 
 
 def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -64,8 +58,8 @@ def _sections(session: Session, info: StreamInfo) -> list[tuple[str, list[tuple[
 def _sections_of_several(scene: Any) -> list[tuple[str, list[tuple[str, str]]]]:
     """Return (heading, rows) of each of several animations that are compared."""
     parts = []
-    for number, (name, one) in enumerate(zip(scene.names, scene.scenes, strict=True)):
-        times, animation = one.timeline, one.animation
+    for number, (name, shown) in enumerate(zip(scene.names, scene.scenes, strict=True)):
+        times, animation = shown.timeline, shown.animation
         rows = [("frames", f"{times.frames}"), ("rate", f"{float(times.rate):g} frames/s")]
         rows.append(("duration", clock_text(times.duration)))
         if times.start:
@@ -111,7 +105,7 @@ def _part(part: PartInfo, name: str, frames: int) -> list[tuple[str, str]]:
     if part.frames != frames:
         rows.append(("frames", f"{part.frames} of {frames}"))
     if part.quants:
-        rows.append(("quantiser", ", ".join(str(one) for one in part.quants)))
+        rows.append(("quantiser", ", ".join(str(quant) for quant in part.quants)))
     if part.mask_types:
         rows.append(("masks", ", ".join(part.mask_types)))
     return rows

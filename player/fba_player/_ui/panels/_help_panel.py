@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from fba_player._ui import theme
-from fba_player._ui.panels.panel import Panel, heading
+from fba_player._ui.panels.panel import Panel, heading, wrapped
 from fba_player.session._keys import keys, mouse
 from fba_player.session._session import Session
 
@@ -13,6 +13,12 @@ MIN_COLUMN_WIDTH = 296.0
 """Least width of a column in points."""
 KEY_WIDTH = 104.0
 """Width of the keys in a column, in points."""
+COLUMNS = {
+    2: (("Play", "Save", "Window"), ("View", "Switches", "Mouse")),
+    3: (("Play",), ("View", "Switches", "Save"), ("Window", "Mouse")),
+    4: (("Play",), ("View", "Switches", "Save"), ("Window",), ("Mouse",)),
+}
+"""Groups in each column, by the number of columns."""
 
 
 class HelpPanel(Panel):
@@ -23,13 +29,12 @@ class HelpPanel(Panel):
     width, height = 1240.0, 520.0
 
     def draw(self, session: Session) -> None:
-        """Draw the content."""
         groups = _groups(session)
         columns = min(int(imgui.get_content_region_avail().x // MIN_COLUMN_WIDTH), 4)
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (6, 1.5))
         if columns > 1 and imgui.begin_table("columns", columns):
             imgui.table_next_row()
-            for names in _columns(columns):
+            for names in COLUMNS[columns]:
                 imgui.table_next_column()
                 for name in names:
                     _group(name, groups.get(name, []))
@@ -38,15 +43,6 @@ class HelpPanel(Panel):
             for name, rows in groups.items():
                 _group(name, rows)
         imgui.pop_style_var()
-
-
-def _columns(count: int) -> list[list[str]]:
-    """Return the names of the groups in each of `count` columns, 2 to 4."""
-    if count == 2:
-        return [["Play", "Save", "Window"], ["View", "Switches", "Mouse"]]
-    if count == 3:
-        return [["Play"], ["View", "Switches", "Save"], ["Window", "Mouse"]]
-    return [["Play"], ["View", "Switches", "Save"], ["Window"], ["Mouse"]]
 
 
 def _groups(session: Session) -> dict[str, list[tuple[str, str]]]:
@@ -67,19 +63,9 @@ def _group(name: str, rows: list[tuple[str, str]]) -> None:
     imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY_WIDTH)
     imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
     for key, does in rows:
-        _line(key, does)
+        imgui.table_next_row()
+        imgui.table_next_column()
+        wrapped(key)
+        imgui.table_next_column()
+        wrapped(does, theme.FAINT)
     imgui.end_table()
-
-
-def _line(key: str, does: str) -> None:
-    imgui.table_next_row()
-    imgui.table_next_column()
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(key)
-    imgui.pop_text_wrap_pos()
-    imgui.table_next_column()
-    imgui.push_style_color(imgui.Col_.text, theme.FAINT)
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(does)
-    imgui.pop_text_wrap_pos()
-    imgui.pop_style_color()

@@ -1,4 +1,4 @@
-"""Emotions in the puppeteer panel: the plane of activation and evaluation, and a slider for each mood."""
+"""Visemes, expressions and moods in the puppeteer panel; a mood has sliders and a place in a plane."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from imgui_bundle import imgui
 
 from fba.emotion import NEUTRAL_POINT, expressions, known_points
 from fba.emotion.plane import SCALE_MAX, SCALE_MIN
+from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
 from fba_player._ui import theme
-from fba_player._ui.panels.panel import choose_name, heading, shorten, tooltip
+from fba_player._ui.panels.panel import choose_name, heading, shorten, tooltip, wrapped
 from fba_player.session._mood import PuppetMood
+from fba_player.session.performer import Performer
+from fba_player.session.puppet import Expression, Viseme
+from fba_player.view._geometry import Box, overlap
 
 MAX_PLANE_HEIGHT = 240.0
 MIN_PLANE_HEIGHT = 130.0
@@ -32,27 +36,25 @@ SIDE_SPACE = 10.0
 """Space around the plane for the dots at its edge, in points."""
 
 
-Box = tuple[float, float, float, float]
-"""Left, top, right, bottom, in points."""
-
-
 class EmotionTab:
-    """Draws the plane and the sliders. areas: of the plane, (left, top, right, bottom), and of sliders by
-    name, (left, right, middle), in points; for tests."""
+    """Draws the plane and the sliders.
+
+    For tests, in points: plane, its left, top, right and bottom; sliders, their left, right and middle by
+    name; labels, the boxes of the names of emotions; hidden, the height of what has to be scrolled to.
+    """
 
     def __init__(self) -> None:
         self.plane = (0.0, 0.0, 0.0, 0.0)
         self.sliders: dict[str, tuple[float, float, float]] = {}
         self.labels: dict[str, Box] = {}
-        """Left, top, right and bottom of the names of emotions in points; for tests."""
         self.hidden = 0.0
-        """Height in points of what has to be scrolled to; for tests."""
 
     def draw(self, mood: PuppetMood) -> None:
-        """Draw the content."""
         heading("Activation and evaluation")
         columns = 2 if imgui.get_content_region_avail().x >= TWO_COLUMNS_WIDTH else 1
-        self._plane(mood, self._height_below(mood, columns))
+        rows = -(-len(mood.weights) // columns) + 1  # and a heading, and two lines of text
+        below = rows * imgui.get_frame_height_with_spacing() + 3.5 * imgui.get_text_line_height_with_spacing()
+        self._plane(mood, below)
         heading("Moods")
         self.sliders = {}
         left, gap = imgui.get_cursor_pos_x(), imgui.get_style().item_spacing.x
@@ -71,21 +73,11 @@ class EmotionTab:
         imgui.end_disabled()
         tooltip("the face follows the animation again")
         text = f"{mood.blend}: activation {mood.blend.activation:.1f}, evaluation {mood.blend.evaluation:.1f}"
-        imgui.push_text_wrap_pos(0.0)
-        imgui.text_colored(theme.FAINT, text if mood.active else "no mood")
-        imgui.pop_text_wrap_pos()
+        wrapped(text if mood.active else "no mood", theme.FAINT)
         self.hidden = imgui.get_scroll_max_y()
 
-    def _height_below(self, mood: PuppetMood, columns: int) -> float:
-        """Return the points that a heading, the sliders, the row of buttons and two lines of text take."""
-        rows = -(-len(mood.weights) // columns) + 1
-        return rows * imgui.get_frame_height_with_spacing() + 3.5 * imgui.get_text_line_height_with_spacing()
-
     def _plane(self, mood: PuppetMood, below: float) -> None:
-        """Draw the plane with the named emotions; the mouse drags the point.
-
-        below: points that it leaves free.
-        """
+        """Draw the plane with the named emotions; the mouse drags the point. below: height left free."""
         wide, room = imgui.get_content_region_avail()
         high = min(max(min(MAX_PLANE_HEIGHT, room - below), MIN_PLANE_HEIGHT), wide * 0.8)
         x, y = imgui.get_cursor_screen_pos()
@@ -111,12 +103,8 @@ class EmotionTab:
             to.add_text(font, AXIS_TEXT, (at, above), theme.packed(theme.FAINT), text)
         taken = [(at, above, at + _width(text, AXIS_TEXT), above + AXIS_TEXT) for text, at, above in ends]
         places = {name: self._place(*point) for name, point in known_points().items()}
-        self.labels = place_labels(
-            places,
-            {name: (_width(name, EMOTION_TEXT), EMOTION_TEXT) for name in places},
-            (x, y, x + wide, y + high),
-            taken,
-        )
+        sizes = {name: (_width(name, EMOTION_TEXT), EMOTION_TEXT) for name in places}
+        self.labels = place_labels(places, sizes, (x, y, x + wide, y + high), taken)
         for name, place in places.items():
             to.add_circle_filled(place, EMOTION_RADIUS, theme.packed(theme.WARM))
             to.add_text(font, EMOTION_TEXT, self.labels[name][:2], theme.packed(theme.TEXT, 0.8), name)
@@ -155,7 +143,7 @@ class EmotionTab:
 
     def _add(self, mood: PuppetMood, wide: float) -> None:
         """Draw the list of the expressions that have no slider yet."""
-        others = [one.name for one in expressions() if one.name not in mood.weights]
+        others = [expression.name for expression in expressions() if expression.name not in mood.weights]
         chosen = choose_name("##more", ("more ...", *others), 0, wide)
         if chosen:
             mood.set_weight(others[chosen - 1], 0.0)
@@ -176,7 +164,7 @@ def place_labels(
     points = [(x - clear, y - clear, x + clear, y + clear) for x, y in dots.values()]
     used = [*taken, *points]
     placed: dict[str, Box] = {}
-    for name, (x, y) in sorted(dots.items(), key=lambda one: one[1][1]):
+    for name, (x, y) in sorted(dots.items(), key=lambda dot: dot[1][1]):
         wide, high = sizes[name]
         beside, middle = clear + 1, y - high / 2
         best, least = (x, y, x, y), math.inf
@@ -186,7 +174,7 @@ def place_labels(
             corners += [(x + side, at) for at in (down, up) for side in (beside, -wide / 2, -beside - wide)]
             for left, top in corners:
                 box = (left, top, left + wide, top + high)
-                covers = sum(_overlap(box, other) for other in used) + wide * high - _overlap(box, within)
+                covers = sum(overlap(box, other) for other in used) + wide * high - overlap(box, within)
                 if covers < least - 0.5:
                     best, least = box, covers
         placed[name] = best
@@ -194,13 +182,59 @@ def place_labels(
     return placed
 
 
-def _overlap(one: Box, other: Box) -> float:
-    """Return the area that two boxes share."""
-    wide = min(one[2], other[2]) - max(one[0], other[0])
-    high = min(one[3], other[3]) - max(one[1], other[1])
-    return max(wide, 0.0) * max(high, 0.0)
-
-
 def _width(text: str, size: float) -> float:
     """Return the width of a text in letters of a size, in points."""
     return float(imgui.calc_text_size(text).x * size / imgui.get_font_size())
+
+
+def draw_visemes(performer: Performer) -> None:
+    """Draw the choice of two visemes and their mix."""
+    heading("Visemes")
+    puppet, now = performer.puppet, performer.puppet.viseme
+    first = _choice("first##viseme", VISEMES, now.select1)
+    second = _choice("second##viseme", VISEMES, now.select2)
+    blend = _slider("share of first", now.blend)
+    if (first, second, blend) != (now.select1, now.select2, now.blend):
+        puppet.viseme = Viseme(first, second, blend)
+    if _release("viseme", enabled=puppet.speaks):
+        puppet.viseme = Viseme()
+
+
+def draw_expressions(performer: Performer) -> None:
+    """Draw the choice of two expressions and their intensities."""
+    heading("Expressions")
+    puppet, now = performer.puppet, performer.puppet.expression
+    values = []
+    before = ("first", now.select1, now.intensity1), ("second", now.select2, now.intensity2)
+    for word, which, strong in before:
+        select = _choice(f"{word}##expression", EXPRESSIONS, which)
+        values += [select, _slider(f"intensity##{word}", strong)]
+    if values != [now.select1, now.intensity1, now.select2, now.intensity2]:
+        puppet.expression = Expression(*values)
+    if _release("expression", enabled=puppet.feels):
+        puppet.expression = Expression()
+    imgui.dummy((1, 4))
+    wrapped(
+        "A viseme replaces the mouth of the animation; expressions are added to the animation. "
+        "Sliders override both.",
+        theme.FAINT,
+    )
+
+
+def _release(what: str, *, enabled: bool) -> bool:
+    """Draw a button, disabled unless `enabled`, so that nothing moves under the mouse; return a press."""
+    imgui.begin_disabled(not enabled)
+    pressed = imgui.button(f"Release##{what}")
+    imgui.end_disabled()
+    return bool(pressed and enabled)
+
+
+def _slider(label: str, now: int) -> int:
+    """Draw a slider from 0 to the largest intensity; return its value."""
+    imgui.set_next_item_width(-100)
+    return int(imgui.slider_int(label, now, 0, INTENSITY_MAX, "%d", imgui.SliderFlags_.always_clamp)[1])
+
+
+def _choice(label: str, names: tuple[str, ...], now: int) -> int:
+    numbered = [f"{number} {name}" if number else "none" for number, name in enumerate(names)]
+    return choose_name(label, numbered, now, -100)

@@ -74,9 +74,8 @@ def groups() -> tuple[Group, ...]:
 def reach(number: int) -> float:
     """Return the amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
     text = (files("fba_player.export") / "contact_sheet.csv").read_text(encoding="utf-8")
-    return next(
-        abs(float(row["value"])) for row in csv.DictReader(text.splitlines()) if int(row["fap"]) == number
-    )
+    rows = csv.DictReader(text.splitlines())
+    return next(abs(float(row["value"])) for row in rows if int(row["fap"]) == number)
 
 
 def _fap_rows(names: list[str]) -> tuple[Row, ...]:
@@ -151,9 +150,9 @@ def _is_flipped(number: int) -> bool:
 
 
 def _other_side(name: str) -> str:
-    for one, other in (("left ", "right "), ("right ", "left "), ("l_", "r_"), ("r_", "l_")):
-        if name.startswith(one):
-            return other + name[len(one) :]
+    for side, other in (("left ", "right "), ("right ", "left "), ("l_", "r_"), ("r_", "l_")):
+        if name.startswith(side):
+            return other + name[len(side) :]
     return ""
 
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from imgui_bundle import imgui
 
 from fba.animation import Animation
-from fba.codec import StreamInfo
+from fba.arrays import Bool, Float64
+from fba.codec import StreamInfo, probe_stream
+from fba.compiled import is_compiled
+from fba.errors import FbaError
 from fba_player._ui import theme
-from fba_player._ui.panels._bit_rates import Rates, bars_of_planes, measure_rates, probe_encoded
 from fba_player._ui.panels._curve_data import Course, TimeZoom
-from fba_player._ui.panels._curve_plot import CURVE, LABEL_HEIGHT, Lane, Lanes
+from fba_player._ui.panels._curve_plot import CURVE_HEIGHT, LABEL_HEIGHT, Lane, Lanes
 from fba_player._ui.panels.panel import Panel, tooltip
 from fba_player._ui.ruler import Ruler
 from fba_player.playback.timeline import clock_text
@@ -21,7 +24,11 @@ from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
 
-BARS = 34.0
+AVERAGED_SECONDS = 1.0
+"""Seconds over which the bit rate is averaged."""
+MAX_VALUES = 3_000_000 if is_compiled() else 30_000
+"""Most values of an animation that is encoded only to show its bit rate: about a second."""
+BARS_HEIGHT = 34.0
 """Height of the bars in points."""
 MIN_LISTED_SHARE = 0.02
 """Least share of bits around the planes that is listed."""
@@ -29,6 +36,85 @@ MIN_TABLE_WIDTH = 340.0
 """Least width in points for all columns of the table; a narrower one has one less."""
 MIN_BAR_WIDTH = 3.0
 """Least width in points of a bar with its gap."""
+
+
+@dataclass(frozen=True)
+class Total:
+    """Sum over one kind of planes. planes: number, None for bits outside of planes. share: of all bits."""
+
+    name: str
+    planes: int | None
+    bits: int
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """Bits of a stream over time.
+
+    times: seconds of the planes (T,). bits, intra (T,): size and kind of each. rate: kbit/s (N,) in the
+    second that ends with each of the last N planes; for those before, less than a second is known. totals: of
+    I planes, P planes and the bits around them. mean: kbit/s.
+    """
+
+    times: Float64
+    bits: Float64
+    intra: Bool
+    rate: Float64
+    totals: tuple[Total, ...]
+    mean: float
+
+
+def measure_rates(info: StreamInfo) -> Rates | None:
+    """Return the bit rates of a stream; None if it has no planes."""
+    if info.plane_bits is None or info.plane_intra is None or info.frame_index is None or not info.frames:
+        return None
+    times = (info.frame_index - info.frame_index[0]) / float(info.rate) + float(info.start)
+    bits, intra = info.plane_bits.astype(np.float64), info.plane_intra
+    until = np.r_[0.0, np.cumsum(bits)]
+    before = np.searchsorted(times, times - AVERAGED_SECONDS + 1e-9, side="left")
+    rate = (until[1:] - until[before]) / AVERAGED_SECONDS / 1000
+    full_second = times[0] + AVERAGED_SECONDS - 1 / float(info.rate)
+    first = min(int(np.searchsorted(times, full_second - 1e-9)), len(times) - 1)
+    all_bits = max(8 * info.size, int(bits.sum()), 1)
+    rows = [
+        Total(name, int(kind.sum()), int(bits[kind].sum()), float(bits[kind].sum()) / all_bits)
+        for name, kind in (("I planes", intra), ("P planes", ~intra))
+    ]
+    rest = 8 * info.size - int(bits.sum())
+    if rest > 0:
+        rows.append(Total("around them", None, rest, rest / all_bits))
+    return Rates(times, bits, intra, rate[first:], tuple(rows), info.bits_per_second / 1000)
+
+
+def probe_encoded(animation: Animation) -> StreamInfo | None:
+    """Return information about an animation as if encoded; None if it is too long or cannot be encoded."""
+    tracks = [track for track in (animation.face, animation.body) if track is not None]
+    if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MAX_VALUES:
+        return None
+    try:
+        from fba.planning import encode
+
+        return probe_stream(encode(animation))
+    except (FbaError, ValueError):
+        return None
+
+
+def bars_of_planes(
+    times: Float64, bits: Float64, intra: Bool, low: float, high: float, count: int
+) -> tuple[Float64, Bool]:
+    """Return the bits (count,) of the largest plane in each equal part of low..high, 0 without one.
+
+    Also whether the part has an I plane.
+    """
+    tall, key = np.zeros(count), np.zeros(count, bool)
+    if not high > low:
+        return tall, key
+    seen = (times >= low - 1e-9) & (times <= high + 1e-9)
+    columns = np.clip(((times[seen] - low) / (high - low) * count).astype(int), 0, count - 1)
+    np.maximum.at(tall, columns, bits[seen])
+    key[columns[intra[seen]]] = True
+    return tall, key
 
 
 class RatePanel(Panel):
@@ -51,11 +137,9 @@ class RatePanel(Panel):
         """Left, top, right, bottom of the bars in points; for tests."""
 
     def available(self, session: Session) -> bool:
-        """Return whether a single animation is shown."""
         return not isinstance(session.scene, CompareScene)
 
     def draw(self, session: Session) -> None:
-        """Draw the content."""
         info, note = self._stream(session)
         if info is None:
             imgui.text_colored(theme.FAINT, note)
@@ -69,9 +153,9 @@ class RatePanel(Panel):
             return
         transport = session.transport
         self.time_zoom.bound(transport.start, max(float(rates.times[-1]), transport.start))
-        high = BARS + 6 + imgui.get_text_line_height_with_spacing() * 2.5
+        high = BARS_HEIGHT + 6 + imgui.get_text_line_height_with_spacing() * 2.5
         imgui.begin_child(
-            "rate", (0, max(imgui.get_content_region_avail().y - high, LABEL_HEIGHT + CURVE + 24))
+            "rate", (0, max(imgui.get_content_region_avail().y - high, LABEL_HEIGHT + CURVE_HEIGHT + 24))
         )
         row = _row(rates, transport.time) - (len(rates.times) - len(rates.rate))
         now = {("rate", 0): float(rates.rate[row])} if row >= 0 else {}
@@ -81,7 +165,6 @@ class RatePanel(Panel):
         _table(rates)
 
     def closed(self, session: Session) -> None:
-        """Stop asking for pictures; what was encoded stays."""
         session.rolling.discard(self.name)
 
     def _stream(self, session: Session) -> tuple[StreamInfo | None, str]:
@@ -105,18 +188,15 @@ class RatePanel(Panel):
             return None, "Encoding, to measure its bit rate..."
         session.rolling.discard(self.name)
         encoded = self._encoded[1][0]
-        return (
-            encoded,
-            "if encoded" if encoded else "It cannot be encoded, or is too long.",
-        )
+        return encoded, "if encoded" if encoded else "It cannot be encoded, or is too long."
 
     def _planes(self, session: Session, rates: Rates) -> None:
         """Draw the bars; a click seeks."""
         left, top = imgui.get_cursor_screen_pos()
         wide = max(imgui.get_content_region_avail().x, 8.0)
-        imgui.invisible_button("planes", (wide, BARS))
+        imgui.invisible_button("planes", (wide, BARS_HEIGHT))
         ruler = Ruler(self.time_zoom.low, self.time_zoom.high, left, left + wide)
-        self.bars = (left, top, left + wide, top + BARS)
+        self.bars = (left, top, left + wide, top + BARS_HEIGHT)
         mouse = imgui.get_io().mouse_pos.x
         if imgui.is_item_active():
             session.touched()
@@ -127,16 +207,15 @@ class RatePanel(Panel):
             imgui.set_tooltip(f"{clock_text(rates.times[row])}   {kind} plane, {rates.bits[row]:.0f} bits")
         to = imgui.get_window_draw_list()
         to.add_rect_filled(
-            (left, top), (left + wide, top + BARS), theme.packed((0, 0, 0, 0.22)), rounding=3.0
+            (left, top), (left + wide, top + BARS_HEIGHT), theme.packed(theme.HOLLOW), rounding=3.0
         )
         plain, key = theme.packed(theme.ACCENT, 0.75), theme.packed(theme.WARM)
         for x, right, tall, intra in self._bar_boxes(rates, wide):
-            to.add_rect_filled(
-                (left + x, top + BARS - tall), (left + right, top + BARS), key if intra else plain
-            )
+            corners = (left + x, top + BARS_HEIGHT - tall), (left + right, top + BARS_HEIGHT)
+            to.add_rect_filled(*corners, key if intra else plain)
         at = ruler.x(session.transport.time)
         if self.time_zoom.low <= session.transport.time <= self.time_zoom.high:
-            to.add_line((at, top), (at, top + BARS), theme.packed(theme.TEXT, 0.8))
+            to.add_line((at, top), (at, top + BARS_HEIGHT), theme.packed(theme.TEXT, 0.8))
 
     def _bar_boxes(self, rates: Rates, wide: float) -> list[tuple[float, float, float, bool]]:
         """Return (left, right, height, I plane) of the bars; cached until something changes."""
@@ -149,7 +228,9 @@ class RatePanel(Panel):
         tall, intra = bars_of_planes(
             rates.times, rates.bits, rates.intra, time_zoom.low, time_zoom.high, count
         )
-        heights = np.where(tall > 0, 2 + (BARS - 6) * np.sqrt(tall / max(float(rates.bits.max()), 1.0)), 0.0)
+        heights = np.where(
+            tall > 0, 2 + (BARS_HEIGHT - 6) * np.sqrt(tall / max(float(rates.bits.max()), 1.0)), 0.0
+        )
         each = wide / count
         gap = 1 if each >= MIN_BAR_WIDTH else 0
         bars = [

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import ClassVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar, TypeVar
 
 from imgui_bundle import imgui
 
 from fba_player._ui import theme
 from fba_player.session._keys import key_of
 from fba_player.session._session import Session
+
+Word = TypeVar("Word", bound=str)
 
 _FLAGS = imgui.WindowFlags_
 STANDING = int(
@@ -66,17 +68,27 @@ def facts(name: str, rows: list[tuple[str, str]]) -> None:
             imgui.table_next_column()
             imgui.text_colored(theme.FAINT, what)
             imgui.table_next_column()
-            imgui.push_text_wrap_pos(0.0)
-            imgui.text_unformatted(value)
-            imgui.pop_text_wrap_pos()
+            wrapped(value)
         imgui.end_table()
+
+
+def wrapped(text: str, colour: theme.Colour = theme.TEXT) -> None:
+    """Draw a text in a colour, wrapped at the right edge."""
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_colored(colour, text)
+    imgui.pop_text_wrap_pos()
 
 
 def heading(text: str, *, exact: bool = False) -> None:
     """Draw a heading, in capitals unless `exact`, which is for text with names in it."""
     imgui.dummy((0, 2))
-    imgui.push_font(None, theme.SMALL)
-    imgui.text_colored(theme.ACCENT, text if exact else text.upper())
+    sized(text if exact else text.upper(), theme.SMALL, theme.ACCENT)
+
+
+def sized(text: str, size: float, colour: theme.Colour) -> None:
+    """Draw a text in letters of this size, in points."""
+    imgui.push_font(None, size)
+    imgui.text_colored(colour, text)
     imgui.pop_font()
 
 
@@ -98,6 +110,17 @@ def choose_name(label: str, names: Sequence[str], now: int, width: float = -1) -
                 now = number
         imgui.end_combo()
     return now
+
+
+def choose_by_button(texts: Mapping[Word, str], now: str) -> Word | None:
+    """Draw radio buttons beside each other, with the texts of names; return a name that is clicked."""
+    clicked = None
+    for number, (name, text) in enumerate(texts.items()):
+        if number:
+            imgui.same_line()
+        if imgui.radio_button(text, now == name):
+            clicked = name
+    return clicked
 
 
 def tooltip(text: str, key: str = "") -> None:

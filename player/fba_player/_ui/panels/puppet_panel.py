@@ -9,9 +9,8 @@ from imgui_bundle import imgui
 from fba.errors import FbaError
 from fba_player._ui import theme
 from fba_player._ui.panels._curve_data import parameter
-from fba_player._ui.panels._puppet_emotion import EmotionTab
+from fba_player._ui.panels._puppet_emotion import EmotionTab, draw_expressions, draw_visemes
 from fba_player._ui.panels._puppet_rows import Group, Row, groups
-from fba_player._ui.panels._puppet_speech import draw_expressions, draw_visemes
 from fba_player._ui.panels.panel import Panel, shorten, tooltip
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
@@ -171,9 +170,8 @@ class PuppetPanel(Panel):
             imgui.dummy((1, high))
             return
         puppet = performer.puppet
-        moved, shown = (
-            (puppet.fap_moved, puppet.shown[0]) if row.kind == "fap" else (puppet.bap_moved, puppet.shown[1])
-        )
+        moved = puppet.fap_moved if row.kind == "fap" else puppet.bap_moved
+        shown = puppet.shown[row.kind == "bap"]
         touched = bool(moved[row.numbers[0] - 1])
         value = sum(float(shown[number - 1]) for number in row.numbers) * row.scale
         title = row.title
@@ -192,9 +190,8 @@ class PuppetPanel(Panel):
         if touched:
             imgui.push_style_color(imgui.Col_.slider_grab, theme.ACCENT)
         name = f"##{group.name}{index}"
-        changed, value = imgui.slider_float(
-            name, value, row.low, row.high, "", imgui.SliderFlags_.always_clamp
-        )
+        clamped = imgui.SliderFlags_.always_clamp
+        changed, value = imgui.slider_float(name, value, row.low, row.high, "", clamped)
         if touched:
             imgui.pop_style_color()
         self.sliders[group.name, index] = (x + name_wide, x + name_wide + wide, y + high / 2)
@@ -208,11 +205,9 @@ class PuppetPanel(Panel):
         if changed:
             self._move(performer, group, row, value)
         text = f"{value:.0f} {row.unit}"
-        imgui.get_window_draw_list().add_text(
-            (right - 4 - imgui.calc_text_size(text).x, y + 3),
-            theme.packed(theme.TEXT if touched else theme.FAINT),
-            text,
-        )
+        shade = theme.packed(theme.TEXT if touched else theme.FAINT)
+        place = (right - 4 - imgui.calc_text_size(text).x, y + 3)
+        imgui.get_window_draw_list().add_text(place, shade, text)
         if touched:
             imgui.same_line()
             imgui.set_cursor_screen_pos((right, y))
@@ -231,30 +226,28 @@ class PuppetPanel(Panel):
         return [(row, 1.0), (group.rows[row.mirror], -1.0 if row.flipped else 1.0)]
 
     def _move(self, performer: Performer, group: Group, row: Row, value: float) -> None:
-        for one, sign in self._both(group, row):
-            _set(performer, one.kind, one.numbers, sign * value / one.scale / len(one.numbers))
+        for moved, sign in self._both(group, row):
+            _set(performer, moved.kind, moved.numbers, sign * value / moved.scale / len(moved.numbers))
 
     def _release(self, performer: Performer, group: Group, row: Row) -> None:
-        for one, _ in self._both(group, row):
-            _release_parameters(performer, one.kind, one.numbers)
+        for moved, _ in self._both(group, row):
+            _release(performer, moved.kind, moved.numbers)
 
 
 def _group_buttons(performer: Performer, group: Group, *, touched: bool) -> None:
-    """Draw the buttons of a group."""
     if imgui.small_button(f"All to zero##{group.name}"):
         _set(performer, group.kind, group.numbers, 0.0)
     if touched:
         imgui.same_line()
         if imgui.small_button(f"Release##{group.name}"):
-            _release_parameters(performer, group.kind, group.numbers)
+            _release(performer, group.kind, group.numbers)
     imgui.dummy((1, 2))
 
 
 def _parameter_names(row: Row) -> str:
     """Return the parameters that a row moves, as text."""
-    names = [parameter(row.kind, number).name for number in row.numbers]
-    pairs = zip(row.numbers, names, strict=True)
-    return f"{row.kind.upper()} " + ", ".join(f"{number} {name}" for number, name in pairs)
+    names = (f"{number} {parameter(row.kind, number).name}" for number in row.numbers)
+    return f"{row.kind.upper()} {', '.join(names)}"
 
 
 def _set(performer: Performer, kind: str, numbers: tuple[int, ...], value: float) -> None:
@@ -263,7 +256,7 @@ def _set(performer: Performer, kind: str, numbers: tuple[int, ...], value: float
         move(number, value)
 
 
-def _release_parameters(performer: Performer, kind: str, numbers: tuple[int, ...]) -> None:
+def _release(performer: Performer, kind: str, numbers: tuple[int, ...]) -> None:
     if kind == "fap":
         performer.puppet.release(faps=numbers)
     else:
@@ -276,9 +269,8 @@ def _save(session: Session, performer: Performer, name: str) -> None:
     except (FbaError, OSError) as error:
         session.say(str(error), "error", 8.0)
         return
-    how = (
-        ""
-        if steps == "iso" or performer.takes.last is None or performer.takes.last.body is None
-        else f". Play it with: fba play {shlex.quote(str(path))} --bap-steps {steps}"
-    )
+    last = performer.takes.last
+    how = ""
+    if steps != "iso" and last is not None and last.body is not None:
+        how = f". Play it with: fba play {shlex.quote(str(path))} --bap-steps {steps}"
     session.say(f"Saved as {path}{how}", seconds=8.0 if how else 4.0)
