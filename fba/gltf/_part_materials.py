@@ -91,7 +91,7 @@ class PartWriter:
 
 
 def read_material(entry: Value, gltf: Gltf, primitive: Primitive) -> Material:
-    """Return the material of a part, which is this primitive. FormatError for a texture that has no place on it.
+    """Return the material of the part made of a primitive. ModelError for a texture without coordinates.
 
     entry: the part's entry in our extension, which has the material's colour where colours of vertices
     replace it.
@@ -101,7 +101,9 @@ def read_material(entry: Value, gltf: Gltf, primitive: Primitive) -> Material:
         return Material()
     material = gltf.materials[primitive.material]
     if material.texture is not None and not primitive.texcoords:
-        raise entry.error("its material has a texture, but its mesh has no texture coordinates; leave one out")
+        raise entry.error(
+            "its material has a texture, but its mesh has no texture coordinates; leave one out"
+        )
     read = convert_material(material, material.texture)
     if given is not None:
         red, green, blue = given.numbers(3, 0.0, 1.0)
