@@ -92,8 +92,7 @@ def build_surface(model: FaceModel, moved_rows: Integer) -> Surface:
 
 
 def _sum_normals(vertices: Float64, triangles: Int32, corners: Int64, count: int) -> Float64:
-    """Return (count, 3) sums of the triangles' normals, as long as twice their area, over `corners` (F,
-    3)."""
+    """Return (count, 3) sums of the normals of triangles, twice their areas long, over corners (F, 3)."""
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     across = np.cross(b - a, c - a)
     summed = np.empty((count, 3))

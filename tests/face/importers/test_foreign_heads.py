@@ -22,7 +22,7 @@ from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._joining import join_pieces
-from fba.face.importers.assembly._openings import find_eye_loop, lid_points_of_loop
+from fba.face.importers.assembly._outlines import find_eye_loop, lid_points_of_loop
 from fba.face.importers.assembly._pieces import assemble
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.importers.assembly._repair import _stopped, repair_tables

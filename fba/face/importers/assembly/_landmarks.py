@@ -18,9 +18,13 @@ from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, flat_width, sphere
 from fba.face.feature_points import row_of
-from fba.face.importers.assembly._openings import find_eye_loop, lid_points_of_loop, mouth_points
+from fba.face.importers.assembly._outlines import (
+    find_eye_loop,
+    lid_points_of_loop,
+    mouth_points,
+    profile_points,
+)
 from fba.face.importers.assembly._polygon_parts import Piece
-from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._symmetry import mirror_points
 from fba.face.importers.assembly._warping import warp_points
 from fba.face.model import Part
@@ -121,8 +125,7 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
 
 
 def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:
-    """Return the tip, middle and borders of a tongue; the last a third of the pupils' distance behind the
-    tip."""
+    """Return a tongue's tip, and its middle and borders a third of the pupils' distance behind that."""
     tongues = [piece.part.vertices for piece in pieces if piece.part.kind == "tongue"]
     if not tongues:
         return {}
@@ -240,8 +243,7 @@ def _from_arkit(
 def _lids(
     vertices: Float64, blink: Float64, eye: tuple[Float64, float, Float64], side: str
 ) -> dict[str, Float64]:
-    """Return the middles of the lids' margins, what a blink lowers most and what it then meets, and their
-    corners."""
+    """Return the lid margins' middles, what a blink lowers most and what it meets, and their corners."""
     centre, radius, _ = eye
     distance = np.linalg.norm(vertices - centre, axis=1)
     near = distance < 1.3 * radius
@@ -304,8 +306,7 @@ def _mouth(
     eyes: Mapping[str, tuple[Float64, float, Float64]],
     path: str,
 ) -> dict[str, Float64]:
-    """Return the middles of the lips, corners of the mouth, and points between. facing: vertices that face
-    forwards."""
+    """Return lip middles, mouth corners, and points between. facing: vertices that face forwards."""
     vertices = skin.vertices.astype(np.float64)
     left, right = eyes["left"][0], eyes["right"][0]
     apart = left[0] - right[0]
@@ -390,8 +391,7 @@ def _end_of_slit(
 def _lip_pair(
     vertices: Float64, drop: Float64, ahead: Bool, x: float, apart: float
 ) -> tuple[int, int] | None:
-    """Return the upper and lower lip at some x: vertices close together that an opening jaw parts the
-    furthest."""
+    """Return the upper and lower lip at some x: close vertices that an opening jaw parts furthest."""
     column = np.flatnonzero((np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead)
     if not len(column) or not drop[column].max() > 0:
         return None
