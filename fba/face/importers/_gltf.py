@@ -123,12 +123,12 @@ def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Fl
     assembled = assemble(upright, options.kinds)
     eyes = find_eyes(assembled, path)
     notes = {"feature points": "found by the shapes of the head, not given"}
-    upright, angle = stand_upright(upright, eyes["left"][0], eyes["right"][0], assembled)
+    upright, angle = stand_upright(upright, eyes["left"].centre, eyes["right"].centre, assembled)
     if angle:
         notes["position"] = f"turned by {np.degrees(angle):.1f} degrees, so that both sides are level"
         assembled = assemble(upright, options.kinds)
         eyes = find_eyes(assembled, path)
-    uneven = asymmetry(assembled, eyes["left"][0], eyes["right"][0])
+    uneven = asymmetry(assembled, eyes["left"].centre, eyes["right"].centre)
     points = find_points(assembled, path, symmetric=uneven < MIRRORED_POINTS, exactly=uneven < MIRRORED_LIDS)
     return upright, points, uneven, notes
 

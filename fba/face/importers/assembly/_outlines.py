@@ -107,10 +107,10 @@ def _shortest_loop(surface: Surface, centre: Float64, radius: float, hidden: flo
     return loop, float(round_trip[best])
 
 
-def lid_points_of_loop(points: Float64, loop: Intp, x: float) -> dict[str, int]:
-    """Return the vertices of a loop that are the middles of the lids and the corners of the eye.
+def lid_points_of_loop(points: Float64, loop: Intp, x: float) -> list[int]:
+    """Return the vertices of a loop at the upper and lower lid and the left and right corner, or [].
 
-    points: (N, 3) of the surface. x: of the pupil. Names: "upper", "lower", "left", "right" (the subject's).
+    points: (N, 3) of the surface. x: of the pupil.
     """
     ring = points[loop]
     left, right = int(ring[:, 0].argmax()), int(ring[:, 0].argmin())
@@ -118,13 +118,10 @@ def lid_points_of_loop(points: Float64, loop: Intp, x: float) -> dict[str, int]:
     inside = np.arange(first + 1, last)
     outside = np.concatenate([np.arange(last + 1, len(loop)), np.arange(first)])
     if not len(inside) or not len(outside):
-        return {}
+        return []
     arcs = sorted((inside, outside), key=lambda arc: float(ring[arc, 1].mean()))
     lower, upper = (int(arc[np.abs(ring[arc, 0] - x).argmin()]) for arc in arcs)
-    return {
-        name: int(loop[row])
-        for name, row in (("upper", upper), ("lower", lower), ("left", left), ("right", right))
-    }
+    return [int(loop[row]) for row in (upper, lower, left, right)]
 
 
 def mouth_points(
