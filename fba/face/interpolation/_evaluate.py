@@ -18,11 +18,7 @@ VALUE_MAX = float(2**31 - 1)
 
 
 def evaluate(
-    table: InterpolationTable,
-    values: npt.NDArray[np.generic],
-    known: Bool,
-    viseme: Int16,
-    expression: Int16,
+    table: InterpolationTable, values: npt.NDArray[np.generic], known: Bool, viseme: Int16, expression: Int16
 ) -> tuple[Float64, Bool, Bool]:
     """Return (values, known, from_high_level), all (T, 68): unknown FAPs filled in by a FIT.
 
@@ -50,11 +46,7 @@ def evaluate(
 
 
 def estimate(
-    table: InterpolationTable,
-    values: npt.NDArray[np.generic],
-    known: Bool,
-    viseme: Int16,
-    expression: Int16,
+    table: InterpolationTable, values: npt.NDArray[np.generic], known: Bool, viseme: Int16, expression: Int16
 ) -> tuple[Float64, Bool]:
     """Return what a FIT would give for each FAP if only that were unknown; arguments as of `evaluate`."""
     result = np.zeros(known.shape)

@@ -130,11 +130,7 @@ class Mixer:
         return made, used
 
     def _coupled_tables(
-        self,
-        inner_fap: int,
-        outer_fap: int,
-        inner: tuple[Float64, Float64],
-        outer: tuple[Float64, Float64],
+        self, inner_fap: int, outer_fap: int, inner: tuple[Float64, Float64], outer: tuple[Float64, Float64]
     ) -> dict[int, FaceDefTables]:
         """Return tables of a lip's FAPs, limited at folds, from (V, 3) metres a step below and above 0."""
         surface = self.shapes.surface
@@ -263,13 +259,7 @@ def fold_limited_tables(shapes: Shapes, fap: int, down: Float64, up: Float64) ->
 
 
 def _tables(
-    model: FaceModel,
-    surface: Surface,
-    fap: int,
-    motion: Motion,
-    share: Float64,
-    down: Float64,
-    up: Float64,
+    model: FaceModel, surface: Surface, fap: int, motion: Motion, share: Float64, down: Float64, up: Float64
 ) -> FaceDefTables | None:
     """Return the tables of a motion of the skin, which teeth, brows and lashes follow; None without motion.
 

@@ -194,13 +194,7 @@ def _other(lid: str) -> str:
 
 
 def _share(
-    marks: Landmarks,
-    opening: Opening,
-    eye: Eye,
-    lid: str,
-    own: Intp,
-    other: Intp,
-    parts: Sequence[Part],
+    marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, other: Intp, parts: Sequence[Part]
 ) -> Float64:
     """Return (N,) share of the margin's motion at each vertex of a column.
 
