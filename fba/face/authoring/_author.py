@@ -99,9 +99,7 @@ def author(
         points=binding.points,
         bound=binding.bound,
         tables=tuple(
-            build_tables(
-                fap, marks.fapu[faps()[fap - 1].unit], work.moves.get(fap, {}), work.turns.get(fap, ())
-            )
+            build_tables(fap, marks.fapu.of_fap(fap), work.moves.get(fap, {}), work.turns.get(fap, ()))
             for fap in sorted({*work.moves, *work.turns})
         ),
         fit=fit,
@@ -131,8 +129,7 @@ def author_lids(model: FaceModel, sculpted: Mapping[int, Sequence[Float64]]) -> 
                 work.add_lid(fap, shift)
                 break
         if fap in work.moves:
-            unit = model.fapu[faps()[fap - 1].unit]
-            made[fap] = build_tables(fap, unit, work.moves[fap])
+            made[fap] = build_tables(fap, model.fapu.of_fap(fap), work.moves[fap])
     return made
 
 

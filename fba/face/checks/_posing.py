@@ -18,7 +18,6 @@ from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld
 from fba.face.checks._findings import Finding
 from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
-from fba.parameters import faps
 
 KIND_ORDER = ("scale", "rotation", "translation")
 """Order in which the transforms of a part act, as in a Transform node."""
@@ -56,13 +55,13 @@ class Poser:
             (self.model.table_of[fap], value) for fap, value in values.items() if fap in self.model.table_of
         ]
         for table, value in tables:
-            unit = self.model.fapu[faps()[table.fap - 1].unit]
+            unit = self.model.fapu.of_fap(table.fap)
             for mesh in table.meshes:
                 start = self.model.starts[mesh.part]
                 moved[mesh.vertices + start] += mesh.shift(value).astype(np.float64) * unit
         for part in self.model.parts:
             turns = [
-                (transform, value * self.model.fapu[faps()[table.fap - 1].unit])
+                (transform, value * self.model.fapu.of_fap(table.fap))
                 for table, value in tables
                 for transform in table.transforms
                 if transform.part == part.name and transform.part != HEAD

@@ -8,7 +8,6 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Int32, Int64, Integer, Intp, UInt32
 from fba.face.model import FaceModel
-from fba.parameters import faps
 
 SEAM_COSINE = 0.7
 """Coincident vertices share a normal where their neutral normals differ by less than about 45 degrees. Along
@@ -141,6 +140,6 @@ def _test_motion(model: FaceModel, sign: float) -> Float64:
     for table in model.tables:
         value = sign * (200.0 + 37.0 * (table.fap * 29 % 67))
         for mesh in table.meshes:
-            shift = mesh.shift(value) * model.fapu[faps()[table.fap - 1].unit]
+            shift = mesh.shift(value) * model.fapu.of_fap(table.fap)
             moved[model.starts[mesh.part] + mesh.vertices] += shift
     return moved

@@ -98,7 +98,7 @@ def flatten_shifts(model: FaceModel, members: Members, dtype: type[np.floating[A
     slopes, bases = np.empty((capacity, 3), dtype=dtype), np.empty((capacity, 3), dtype=dtype)
     count = base_count = 0
     for table in model.tables:
-        unit = model.fapu[faps()[table.fap - 1].unit]
+        unit = model.fapu.of_fap(table.fap)
         for mesh in table.meshes:
             own = number[mesh.part]
             tracks.append((table.fap - 1, own, len(intervals)))
@@ -185,7 +185,7 @@ def flatten_transforms(model: FaceModel) -> Transforms:
     names = [*(part.name for part in model.parts), HEAD]
     entries: list[list[tuple[tuple[int, float], int, list[float], tuple[float, ...]]]] = [[] for _ in names]
     for table in model.tables:
-        unit = model.fapu[faps()[table.fap - 1].unit]
+        unit = model.fapu.of_fap(table.fap)
         # yaw 49, roll 50, pitch 48: the order of the joints of the spine that the head stands on
         outward = HEAD_ROLL + 0.5 if table.fap == HEAD_PITCH else float(table.fap)
         for transform in table.transforms:

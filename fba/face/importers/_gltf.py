@@ -49,27 +49,17 @@ VRM_VISEMES = {
 }  # fmt: skip
 """Names of visemes and expressions (`assembly/visemes.csv`) by VRM's presets, in lower case."""
 VRM_SHAPES = {
-    "a": "jawOpen",
-    "aa": "jawOpen",
-    "blink": "eyesClosed",
-    "blink_l": "eyeBlinkLeft",
-    "blinkleft": "eyeBlinkLeft",
-    "blink_r": "eyeBlinkRight",
-    "blinkright": "eyeBlinkRight",
-}
+    "a": "jawOpen", "aa": "jawOpen", "blink": "eyesClosed",
+    "blink_l": "eyeBlinkLeft", "blinkleft": "eyeBlinkLeft",
+    "blink_r": "eyeBlinkRight", "blinkright": "eyeBlinkRight",
+}  # fmt: skip
 """ARKit's shapes by VRM's presets, in lower case."""
 MAX_EXPRESSIONS = 4096
 """Number of expressions that an avatar may have, and of morph targets that an expression may have."""
 BOTH_SIDES = {
-    "eyesclosed": "eyeBlink",
-    "eyeblink": "eyeBlink",
-    "eyesblink": "eyeBlink",
-    "blink": "eyeBlink",
-    "vrcblink": "eyeBlink",
-    "fcleyeclose": "eyeBlink",
-    "mouthsmile": "mouthSmile",
-    "smile": "mouthSmile",
-}
+    "eyesclosed": "eyeBlink", "eyeblink": "eyeBlink", "eyesblink": "eyeBlink", "blink": "eyeBlink",
+    "vrcblink": "eyeBlink", "fcleyeclose": "eyeBlink", "mouthsmile": "mouthSmile", "smile": "mouthSmile",
+}  # fmt: skip
 """ARKit's names, without the side, of shapes of both sides (in small letters only)."""
 MOVED_SHARE = 0.2
 """Share of a shape's largest motion above which a vertex shows where the shape is."""

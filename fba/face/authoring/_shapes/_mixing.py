@@ -227,7 +227,7 @@ class Mixer:
 
 def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
     """Return (V, 3) metres a step: displacements by a FAP next to 0, above (sign 1) or below (-1) it."""
-    unit = model.fapu[faps()[fap - 1].unit]
+    unit = model.fapu.of_fap(fap)
     field = np.zeros((len(model.vertices), 3))
     for mesh in model.table_of[fap].meshes:
         zero = int(np.flatnonzero(mesh.borders == 0)[0])
@@ -274,7 +274,7 @@ def _tables(
         if len(moved):
             steps = np.where((share < 0)[:, None, None], down[own][moved], up[own][moved])
             motions[part.name] = Motion(motion.values, moved, steps * share[:, None, None])
-    made = build_tables(fap, model.fapu[faps()[fap - 1].unit], motions)
+    made = build_tables(fap, model.fapu.of_fap(fap), motions)
     return made if made.meshes else None
 
 

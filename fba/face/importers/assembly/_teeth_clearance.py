@@ -205,7 +205,7 @@ def _with_push(
     model: FaceModel, table: FaceDefTables, push: Mapping[float, Float64], surface: Surface
 ) -> FaceDefTables:
     """Return the table of a FAP with a forward motion of the surface, (N,) metres by value."""
-    unit = model.fapu[faps()[table.fap - 1].unit]
+    unit = model.fapu.of_fap(table.fap)
     meshes = {mesh.part: mesh for mesh in table.meshes}
     for part, number in surface.members.items():
         if part in meshes:
