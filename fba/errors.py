@@ -21,6 +21,7 @@ option in place of the argument.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
@@ -74,6 +75,11 @@ class FbaError(_Remediable, Exception):
 
 class FbaWarning(_Remediable, UserWarning):
     """The input was read, but something in it was odd; the text says what and what was assumed."""
+
+
+def warn(text: str, stacklevel: int = 1) -> None:
+    """Warn of something odd with an FbaWarning. stacklevel: as of `warnings.warn` in the calling function."""
+    warnings.warn(text, FbaWarning, stacklevel=stacklevel + 1)
 
 
 SAVE_AS_UTF8 = "save it as UTF-8"

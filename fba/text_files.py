@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import os
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import BinaryIO
 
@@ -60,6 +62,12 @@ def read_words(path: str | os.PathLike[str]) -> Iterator[tuple[str, list[str]]]:
         tokens = text.split("#", 1)[0].split()
         if tokens:
             yield f"{os.fspath(path)}:{line}", tokens
+
+
+def packaged_rows(package: str, name: str) -> list[dict[str, str]]:
+    """Return the rows of a CSV file that comes with a package of ours, cells by the titles of columns."""
+    with (files(package) / name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
 
 
 def _opened(name: str) -> tuple[BinaryIO, int]:

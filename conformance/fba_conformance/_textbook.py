@@ -103,9 +103,7 @@ class _GuardedBits:
         self.zeros = 0
         self.count = 0  # bits returned
         self.insertions: list[int] = []  # number of bits returned before each inserted one
-        self.violation: tuple[int, int] | None = (
-            None  # the same for the first 0 in place of an inserted 1, and its position
-        )
+        self.violation: tuple[int, int] | None = None  # the same for the first 0 in its place; its position
 
     def _raw(self) -> int:
         """Return the next bit of the stream."""

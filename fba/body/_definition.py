@@ -53,8 +53,7 @@ class BodyDefinition:
 
     @classmethod
     def load(cls, path: Path) -> BodyDefinition:
-        """Load a definition from JSON: {"joints": {"l_hip": {"centre": [x, y, z], "parent": "sacroiliac"},
-        ...}}.
+        """Load JSON: {"joints": {"l_hip": {"centre": [x, y, z], "parent": "sacroiliac"}, ...}}.
 
         "parent" may be left out of all joints. Raises FormatError where the file cannot be read, ModelError
         where its content is different.
@@ -134,7 +133,7 @@ def calibrate(generic: Skeleton, centres: Mapping[str, Sequence[float]]) -> Skel
         elif below < 0:
             positions[number] = positions[parent] + scales[parent] * (old[number] - old[parent])
         else:
-            share = _share_along(old, parents, parent, number, below)
+            share = _share_along(old, parent, number, below)
             line = given[below] - positions[parent]
             turned = _component_across(old[number] - old[parent], old[below] - old[parent], line)
             positions[number] = positions[parent] + share * line + turned
@@ -158,7 +157,7 @@ def _first_given_below(parents: Int64, given: Mapping[int, Float64]) -> list[int
     return result
 
 
-def _share_along(old: Float64, parents: Int64, parent: int, number: int, below: int) -> float:
+def _share_along(old: Float64, parent: int, number: int, below: int) -> float:
     """Return a joint's position, 0 to 1, from its parent to a given joint below, in the generic body."""
     line = old[below] - old[parent]
     length = float(line @ line)
@@ -170,10 +169,7 @@ def _component_across(offset: Float64, line: Float64, new_line: Float64) -> Floa
     length = float(line @ line)
     if length <= 1e-12:
         return np.zeros(3)
-    result: Float64 = (offset - line * (offset @ line) / length) * math.sqrt(
-        float(new_line @ new_line) / length
-    )
-    return result
+    return (offset - line * (offset @ line) / length) * math.sqrt(float(new_line @ new_line) / length)
 
 
 def _extent(positions: Float64) -> float:

@@ -15,7 +15,7 @@ ROUND_DEGREES = 5.0
 """Unit of angles that were set by hand in degrees."""
 ROUND_RADIANS = 0.1
 """Unit of angles that were set by hand in radians."""
-UNITS = {
+ROUND_UNITS = {
     f"{ROUND_DEGREES:g} degrees": ROUND_DEGREES / DEGREES,
     f"{ROUND_RADIANS:g} rad": ROUND_RADIANS / UNIT,
 }
@@ -42,10 +42,7 @@ class Roundness:
 
 
 def find_rounder_table(levels: Int64, used: BapTable) -> tuple[BapTable, str] | None:
-    """Return the table in which angles are round far more often than in `used`, and the unit; or None.
-
-    levels: (T, 296), in steps.
-    """
+    """Return the table in which angles of levels (T, 296) are far rounder, and the unit; or None."""
     turning = widest_limits().any(axis=1) & (bap_steps(BAP_STEP_TABLES[0]) != bap_steps(BAP_STEP_TABLES[1]))
     columns = np.flatnonzero(turning & levels.any(axis=0))
     quantiser = max(int(np.gcd.reduce(levels[:, columns], axis=None)), 1)
@@ -69,7 +66,7 @@ def _roundness(levels: Int64, steps: Int64) -> Roundness:
     keys = np.ones(levels.shape, dtype=bool)
     keys[1:-1] = changes[1:] != changes[:-1]
     results = []
-    for name, unit in UNITS.items():
+    for name, unit in ROUND_UNITS.items():
         at_keys, of_all = (
             _count_round(levels, counted, steps, unit) for counted in (keys, np.ones_like(keys))
         )
@@ -95,8 +92,7 @@ def _count_round(levels: Int64, counted: Bool, steps: Int64, unit: float) -> tup
 
 def _round(angles: Int64, step: int, unit: float) -> Bool:
     """Return bool (K,): which angles are multiples of unit, as near as the quantiser step allows."""
-    near: Bool = np.abs(angles - unit * np.rint(angles / unit)) <= step / 2
-    return near
+    return np.abs(angles - unit * np.rint(angles / unit)) <= step / 2
 
 
 def _improbability(hits: int, expected: float) -> float:

@@ -14,7 +14,7 @@ from fba.body.stance import find_stance, sole_points
 
 REACH = 0.03
 """Distance from a joint to the points at which displacements are measured, on each axis of its frame, m."""
-BLOCK = 1024
+MEASURED_AT_ONCE = 1024
 """Number of frames measured at once, to limit the memory."""
 
 Frame = Literal["world", "root"]
@@ -58,22 +58,17 @@ def displacements(
     solver = BapSolver(skeleton)
     joints = np.zeros((len(source), len(solver.skeleton)))
     soles = np.zeros((len(source), 2))
-    for start in range(0, len(source), BLOCK):
-        block = slice(start, start + BLOCK)
+    for start in range(0, len(source), MEASURED_AT_ONCE):
+        block = slice(start, start + MEASURED_AT_ONCE)
         pair = [solver.pose(baps[block]) for baps in (source, shown)]
         if frame == "root":
-            pair = [_seen_from_root(matrices) for matrices in pair]
+            pair = [np.linalg.inv(matrices[:, :1]) @ matrices for matrices in pair]
         apart = pair[1] - pair[0]
         offsets = apart[..., :3, 3][..., None] + REACH * apart[..., :3, :3]
         joints[block] = np.sqrt(np.square(offsets).sum(axis=2).max(axis=2))
         soles[block] = _sole_displacements(solver.skeleton, apart)
     stands = _stance(solver, source, rate)
     return Displacements(joints, np.where(stands.T, soles, 0.0))
-
-
-def _seen_from_root(matrices: Float64) -> Float64:
-    """Return joint matrices in the frame of the root."""
-    return np.linalg.inv(matrices[:, :1]) @ matrices
 
 
 def _sole_displacements(skeleton: Skeleton, apart: Float64) -> Float64:
@@ -90,6 +85,6 @@ def _sole_displacements(skeleton: Skeleton, apart: Float64) -> Float64:
 
 def _stance(solver: BapSolver, baps: Int32 | Float64, rate: float) -> Bool:
     """Return bool (2, T): when feet stand. Each piece of a long motion has its ground, as captures climb."""
-    pieces = np.array_split(baps, max(len(baps) // BLOCK, 1))
+    pieces = np.array_split(baps, max(len(baps) // MEASURED_AT_ONCE, 1))
     stances = [find_stance(solver.skeleton, solver.pose(piece), rate) for piece in pieces]
     return np.concatenate(stances, axis=1)

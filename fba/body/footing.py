@@ -74,20 +74,15 @@ def lowest_edge(
     for name, own in points.items():
         position, frame = frames[name]
         heights.append(position[:, 1] + (frame[..., 1, :] @ np.array(own).T).min(axis=-1))
-    lowest: Float64 = np.min(heights, axis=0)
-    return lowest
+    return np.asarray(np.min(heights, axis=0))
 
 
 def lowest_sole(skeleton: Skeleton, matrices: Float64) -> Float64 | None:
-    """Return the height (T,) of the lower foot's lowest point; None for a skeleton without feet.
-
-    matrices: (T, J, 4, 4), as `BapSolver.pose` returns them.
-    """
+    """Return the height (T,) of the lower sole in poses (T, J, 4, 4); None for a skeleton without feet."""
     if not has_feet(skeleton):
         return None
     lows = [lowest_edge(skeleton, foot_frames(skeleton, matrices, side), side, SOLE) for side in SIDES]
-    result: Float64 = np.min(lows, axis=0)
-    return result
+    return np.asarray(np.min(lows, axis=0))
 
 
 def has_feet(skeleton: Skeleton) -> bool:

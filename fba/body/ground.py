@@ -23,7 +23,7 @@ WEIGHT_ABOVE = 0.05
 """Weight of feet above the plane relative to feet below it: the plane must be under the feet."""
 FULL_WEIGHT_DISTANCE = 0.03
 """Metres from the plane beyond which feet count less."""
-STEPS = 20
+PLANE_ROUNDS = 20
 
 
 @dataclass(frozen=True)
@@ -35,15 +35,11 @@ class Ground:
 
     def under(self, points: Float64) -> Float64:
         """Return the heights (...) of the ground under points (..., 3)."""
-        result: Float64 = self.height + points[..., 0] * self.slope[0] + points[..., 2] * self.slope[1]
-        return result
+        return self.height + points[..., 0] * self.slope[0] + points[..., 2] * self.slope[1]
 
 
 def level_under(lowest: Float64, points: Float64) -> Float64:
-    """Return the heights (2, T) of the ground under feet.
-
-    lowest: (2, T), heights of the lowest points of the feet. points: (2, 2, T, 3), their heels and balls.
-    """
+    """Return heights (2, T) of the ground, from the feet's lowest (2, T), heels and balls (2, 2, T, 3)."""
     middles = points.mean(axis=1)
     return find(lowest, middles).under(middles)
 
@@ -81,7 +77,7 @@ def _plane(heights: Float64, across: Float64) -> Float64:
     columns = np.column_stack([np.ones(len(heights)), across])
     hold = np.diag([0.0, 1.0, 1.0]) * len(heights) * (0.3 * MIN_EXTENT) ** 2 * WEIGHT_ABOVE
     plane = np.array([np.percentile(heights, 30), 0.0, 0.0])
-    for _ in range(STEPS):
+    for _ in range(PLANE_ROUNDS):
         over = heights - columns @ plane
         weights = np.where(over > 0, WEIGHT_ABOVE, 1.0) / np.maximum(1.0, np.abs(over) / FULL_WEIGHT_DISTANCE)
         matrix = (columns * weights[:, None]).T @ columns + hold

@@ -77,7 +77,7 @@ class HeadBounds:
 
 
 BOUNDS = Bounds()
-HEAD = HeadBounds()
+HEAD_BOUNDS = HeadBounds()
 
 
 @dataclass(frozen=True)
@@ -240,9 +240,9 @@ def _head_turns_too_far(values: Int64, other: Int64) -> float | None:
     back as people's do, or the head in `other` does not.
     """
     now, then = _head_by_body(values), _head_by_body(other)
-    if now is None or then is None or not HEAD.min_turn <= then[0] <= HEAD.max_turn:
+    if now is None or then is None or not HEAD_BOUNDS.min_turn <= then[0] <= HEAD_BOUNDS.max_turn:
         return None
-    return -now[1] if now[1] < HEAD.too_far <= then[1] <= HEAD.follows else None
+    return -now[1] if now[1] < HEAD_BOUNDS.too_far <= then[1] <= HEAD_BOUNDS.follows else None
 
 
 def _head_by_body(values: Int64) -> tuple[float, float] | None:
@@ -252,7 +252,7 @@ def _head_by_body(values: Int64) -> tuple[float, float] | None:
     head = values[:, columns].sum(axis=1) * UNIT
     if not body.any() or not head.any() or np.ptp(body) == 0 or np.ptp(head) == 0:
         return None
-    if np.corrcoef(body, head)[0, 1] > HEAD.opposed:
+    if np.corrcoef(body, head)[0, 1] > HEAD_BOUNDS.opposed:
         return None
     return float(np.ptp(body)), float(np.polyfit(body, head, 1)[0])
 
@@ -282,8 +282,9 @@ def _beyond(values: Int64) -> Bool:
     low, high = widest_limits()[turning].T
     angles = values[:, turning] * DEGREES
     angles -= FULL_TURN * np.rint((angles - (low + high) / 2) / FULL_TURN)
-    over: Bool = ((angles < low - BOUNDS.joint_margin) | (angles > high + BOUNDS.joint_margin)).any(axis=1)
-    return over
+    return np.asarray(
+        ((angles < low - BOUNDS.joint_margin) | (angles > high + BOUNDS.joint_margin)).any(axis=1)
+    )
 
 
 def _feet(values: Int64) -> Float64:
@@ -331,14 +332,10 @@ def _slide_on_resting_legs(root: Int64, feet: Float64, index: Int64) -> float:
 
 
 def _back_and_forth(root: Int64) -> Int64:
-    """Return how far each of the coordinates (T, K) moves forth and back; 0 for motion in one direction.
-
-    A jump with stiff legs has one direction.
-    """
+    """Return how far each coordinate (T, K) moves forth and back; 0 in one direction, as in a jump."""
     ahead = (root - np.minimum.accumulate(root)).max(axis=0)
     back = (np.maximum.accumulate(root) - root).max(axis=0)
-    shorter: Int64 = np.minimum(ahead, back)
-    return shorter
+    return np.asarray(np.minimum(ahead, back))
 
 
 def _rests(feet: Float64, index: Int64) -> Iterator[slice]:

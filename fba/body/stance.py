@@ -89,13 +89,11 @@ def find_standing(above: Float64, points: Float64, rate: float) -> Bool:
     still = _fastest(speed, rate, STILL_SECONDS) < STILL_SPEED
     alone = (_fastest(rising, rate, STILL_SECONDS) < LEVEL_SPEED) & ~near[::-1]
     placed = (_fastest(speed, rate, PLACED_SECONDS) < STILL_SPEED) & near
-    stands: Bool = (above < SUPPORT_HEIGHT) & np.where(lower, still | alone, placed)
-    return stands
+    return np.asarray((above < SUPPORT_HEIGHT) & np.where(lower, still | alone, placed))
 
 
 def _fastest(speed: Float64, rate: float, seconds: float) -> Float64:
     """Return the highest of speeds (2, T) within a window of `seconds` around each frame."""
     half = round(seconds * rate / 2)
     around = np.pad(speed, ((0, 0), (half, half)), mode="edge")
-    result: Float64 = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2)
-    return result
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1, axis=1).max(axis=2))

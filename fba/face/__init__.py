@@ -5,7 +5,6 @@ points = fba.face.FeaturePointFace()(shown)    # float32 (T, 84, 3): feature poi
 vertices = fba.face.Deformer(model)(shown)     # float32 (T, V, 3): all vertices of a face, metres
 """
 
-from fba.face._compact import compact
 from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.deform._deformer import Deformer
@@ -14,7 +13,7 @@ from fba.face.feature_points import names as feature_point_names
 from fba.face.feature_points import neutral_points
 from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.model import FaceModel, Material, Part
+from fba.face.model import FaceModel, Material, Part, compact
 from fba.face.points import Eyeballs, FeaturePointFace
 from fba.face.resolve import Resolver, resolve
 

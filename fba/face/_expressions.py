@@ -7,16 +7,15 @@ that one moves, with the standard's signs); FAPs that those leave open are set b
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Float32
 from fba.face.mates import fill
 from fba.parameters import EXPRESSION_SELECT_MAX, FAP_COUNT, VISEME_SELECT_MAX, fap_numbers
+from fba.text_files import packaged_rows
 
 VISEME_NAMES = (
     "none",
@@ -76,10 +75,9 @@ def _default() -> Definitions:
         "expression": np.zeros((EXPRESSION_SELECT_MAX + 1, FAP_COUNT), dtype=np.float32),
     }
     listed = {kind: np.zeros(table.shape, dtype=bool) for kind, table in tables.items()}
-    with (files(__package__) / "definitions.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            entry = (int(row["select"]), fap_numbers()[row["fap"]] - 1)
-            tables[row["kind"]][entry] = float(row["value"])
-            listed[row["kind"]][entry] = True
+    for row in packaged_rows(__package__, "definitions.csv"):
+        entry = (int(row["select"]), fap_numbers()[row["fap"]] - 1)
+        tables[row["kind"]][entry] = float(row["value"])
+        listed[row["kind"]][entry] = True
     filled = {kind: fill(table, listed[kind])[0] for kind, table in tables.items()}
     return Definitions(filled["viseme"].astype(np.float32), filled["expression"].astype(np.float32))

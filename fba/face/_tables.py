@@ -88,8 +88,7 @@ def interval_lengths(borders: Int32, value: float) -> Float32:
     edges[0], edges[-1] = min(edges[0], value), max(edges[-1], value)
     low, high = min(0.0, value), max(0.0, value)
     inside = np.clip(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0, None)
-    lengths: Float32 = (inside * (1.0 if value >= 0 else -1.0)).astype(np.float32)
-    return lengths
+    return np.asarray((inside * (1.0 if value >= 0 else -1.0)).astype(np.float32))
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,8 +75,7 @@ def fit_eyeball(part: Part, pupil: Float64) -> tuple[Float64, float, float, floa
 
 
 def flat_width(part: Part) -> float | None:
-    """Return the width of a flat eye, which is an iris without a ball, in the unit of the part; None for
-    others."""
+    """Return the width of a flat eye, an iris without a ball, in the part's unit; None for others."""
     vertices = np.unique(part.vertices.astype(np.float64), axis=0)
     if len(vertices) < FEWEST_VERTICES:
         return None
@@ -134,8 +133,7 @@ def gaze(model: FaceModel, eye: Eyeball) -> Float64 | None:
 
 
 def pupil_diameter(model: FaceModel, eye: Eyeball) -> float | None:
-    """Return the diameter of the pupil, metres, from the vertices that dilate_pupil moves most; None where
-    unknown."""
+    """Return the pupil's diameter, metres, from what dilate_pupil moves most; None where unknown."""
     table = model.table_of.get(PUPIL_FAP[eye.side])
     direction = gaze(model, eye)
     if table is None or direction is None:
@@ -159,5 +157,11 @@ def pupil_diameter(model: FaceModel, eye: Eyeball) -> float | None:
 def distances_from_axis(points: Floating, centre: Float64, direction: Float64) -> Float64:
     """Return (N,) distances of points (N, 3) from the line through a centre along a unit vector."""
     arms = points.astype(np.float64) - centre
-    distances: Float64 = np.linalg.norm(arms - np.outer(arms @ direction, direction), axis=1)
-    return distances
+    return np.asarray(np.linalg.norm(arms - np.outer(arms @ direction, direction), axis=1))
+
+
+def polar(points: Float64, centre: Float64, axis: Float64) -> tuple[Float64, Float64]:
+    """Return (angles (N,) from an axis, radians, distances (N,) from a centre) of points (N, 3)."""
+    arms = points - centre
+    distance = np.linalg.norm(arms, axis=1)
+    return np.arccos(np.clip(arms @ axis / np.maximum(distance, 1e-12), -1, 1)), distance

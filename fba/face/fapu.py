@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from fba.errors import ModelError
 from fba.face.feature_points import row_of
+from fba.parameters import faps
 
 PER_DISTANCE = 1024
 """Each unit of length is a distance of the face divided by this."""
@@ -62,3 +63,7 @@ class Fapu:
 
     def __getitem__(self, unit: str) -> float:
         return float(getattr(self, unit))
+
+    def of_fap(self, number: int) -> float:
+        """Return the unit of a FAP by its number."""
+        return self[faps()[number - 1].unit]

@@ -9,14 +9,13 @@ the teeth. Axes: +x the subject's left, +y up, +z forward; the origin lies betwe
 
 from __future__ import annotations
 
-import csv
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Float64
 from fba.parameters import feature_points
+from fba.text_files import packaged_rows
 
 MIRRORED = {
     "2.4": "2.5", "2.6": "2.7", "2.8": "2.9", "2.11": "2.12", "2.13": "2.14",
@@ -27,6 +26,10 @@ MIRRORED = {
     "10.1": "10.2", "10.3": "10.4", "10.5": "10.6", "10.7": "10.8", "10.9": "10.10", "11.3": "11.2",
 }  # fmt: skip
 """Left feature point to its mirror image on the right."""
+MATES = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
+"""Feature point of either side to its mirror image on the other."""
+FREE_POINTS = ("7.1", "11.5")
+"""Feature points that stand on no surface: inside the head, and above the skin."""
 
 
 @cache
@@ -45,11 +48,10 @@ def row_of() -> dict[str, int]:
 def neutral_points() -> Float64:
     """Return (84, 3) float64, metres; read-only."""
     points = np.full((len(names()), 3), np.nan)
-    with (files(__package__) / "neutral.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            position = np.array([float(row[axis]) for axis in "xyz"]) / 1000.0
-            points[row_of()[row["point"]]] = position
-            if row["point"] in MIRRORED:
-                points[row_of()[MIRRORED[row["point"]]]] = position * (-1.0, 1.0, 1.0)
+    for row in packaged_rows(__package__, "neutral.csv"):
+        position = np.array([float(row[axis]) for axis in "xyz"]) / 1000.0
+        points[row_of()[row["point"]]] = position
+        if row["point"] in MIRRORED:
+            points[row_of()[MIRRORED[row["point"]]]] = position * (-1.0, 1.0, 1.0)
     points.flags.writeable = False
     return points

@@ -17,20 +17,14 @@ from fba.parameters import faps
 
 @cache
 def donors() -> tuple[Intp, ...]:
-    """Return the columns (68,) that unsent FAPs copy, best first: mate, lip mate, the lip mate's mate.
-
-    A FAP without such a mate has its own column.
-    """
+    """Return columns (68,) that unsent FAPs copy: mate, lip mate, its mate; their own without one."""
     mate = np.array([(f.left_right_mate or f.number) - 1 for f in faps()])
     lip = np.array([(f.lip_mate or f.number) - 1 for f in faps()])
     return (mate, lip, mate[lip])
 
 
 def fill(values: npt.NDArray[np.generic], sent: Bool) -> tuple[npt.NDArray[np.generic], Bool]:
-    """Return (values with unsent FAPs copied from their mates, mask of the values now known), as new arrays.
-
-    values: (..., 68). sent: bool (..., 68), whether the value was ever sent.
-    """
+    """Return values (..., 68) with unsent FAPs copied from their mates, and a mask of those now known."""
     filled, known = values.copy(), sent.copy()
     for column in donors():
         copied = ~known & sent[..., column]

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fba.arrays import Float32, Float64, Int32
 from fba.errors import ModelError
 from fba.face._expressions import Definitions
-from fba.face._tables import HEAD, FaceDefTables
+from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names, row_of
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -32,6 +32,10 @@ PART_KINDS = ("skin", "eye", "teeth", "tongue", "mouth", "brow", "lash", "hair",
 left or right by the side of its centre."""
 SHARED_POINT = 1e-4
 """Largest distance of a bound feature point from its vertex, as a share of the face's height."""
+DISPLACEMENT_BITS = 20
+"""Displacements are rounded to multiples of 2**-DISPLACEMENT_BITS of the largest of their FaceDefMesh."""
+COLOUR_SHADES = 65535
+"""Colours become multiples of 1 / COLOUR_SHADES, which glTF stores in 16 bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +115,7 @@ class FaceModel(Meshes[Part]):
                 )
         object.__setattr__(self, "lost", dict(self.lost))
         object.__setattr__(self, "notes", dict(self.notes))
-        self.fapu  # noqa: B018 - raises ModelError for a face without units
+        _ = self.fapu  # raises ModelError for a face without units
 
     @staticmethod
     def default() -> FaceModel:
@@ -242,3 +246,35 @@ def point_row(name: str) -> int:
     if name not in row_of():
         raise ModelError(f"there is no feature point {name!r}")
     return row_of()[name]
+
+
+def compact(model: FaceModel) -> FaceModel:
+    """Return the face, displacements rounded to 2**-20 of the largest, colours to multiples of 1/65535.
+
+    The error is less than a millionth of a vertex's motion; files get at least a tenth smaller. `save` does
+    not round. Vertices that a FAP moves by less than the rounding stay in its tables.
+    """
+    return replace(
+        model,
+        parts=tuple(_compact_part(part) for part in model.parts),
+        tables=tuple(
+            FaceDefTables(table.fap, tuple(_compact_mesh(mesh) for mesh in table.meshes), table.transforms)
+            for table in model.tables
+        ),
+    )
+
+
+def _compact_part(part: Part) -> Part:
+    if part.colours is None:
+        return part
+    steps = np.float32(COLOUR_SHADES)
+    return replace(part, colours=np.rint(np.clip(part.colours, 0, 1) * steps) / steps)
+
+
+def _compact_mesh(mesh: FaceDefMesh) -> FaceDefMesh:
+    largest = float(np.abs(mesh.displacements).max(initial=0.0))
+    if not largest:
+        return mesh
+    step = 2.0 ** (np.ceil(np.log2(largest)) - DISPLACEMENT_BITS)
+    rounded: Float32 = (np.rint(mesh.displacements.astype(np.float64) / step) * step).astype(np.float32)
+    return replace(mesh, displacements=rounded)

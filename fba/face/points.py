@@ -7,10 +7,8 @@ their neighbours (`followers.csv`), so that curves drawn through the points stay
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache, cached_property
-from importlib.resources import files
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +19,7 @@ from fba.face.fapu import PER_DISTANCE, Fapu
 from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
 from fba.parameters import FAP_COUNT, faps
 from fba.rotations import axis_matrices
+from fba.text_files import packaged_rows
 
 DIRECTIONS = {
     "left": (1.0, 0.0, 0.0),
@@ -54,12 +53,9 @@ EYEBALL_PER_IRIS = 1.03
 
 @cache
 def _followers() -> tuple[tuple[int, int, Float64], ...]:
-    """Return (row of a point, row of the point that it follows, (3,) share of each coordinate) of every
-    follower."""
-    with (files(__package__) / "followers.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    """Return each follower's row, the row that it follows, and its (3,) share of each coordinate."""
     followers = []
-    for row in rows:
+    for row in packaged_rows(__package__, "followers.csv"):
         weight = np.array([float(row[axis]) for axis in "xyz"])
         point, source = row["point"], row["source"]
         followers.append((row_of()[point], row_of()[source], weight))
@@ -69,8 +65,7 @@ def _followers() -> tuple[tuple[int, int, Float64], ...]:
 
 
 def shift_table(fapu: Fapu) -> Float64:
-    """Return (68, 84, 3) shift of each feature point by one step of each FAP; zero for FAPs that rotate or
-    scale."""
+    """Return (68, 84, 3) shifts of feature points by one step of each FAP; 0 for those that turn or scale."""
     table = np.zeros((FAP_COUNT, len(names()), 3))
     for fap in faps():
         if fap.positive not in DIRECTIONS or fap.number in ROTATING:
@@ -89,10 +84,7 @@ def shift_table(fapu: Fapu) -> Float64:
 
 @dataclass(frozen=True, eq=False)
 class Eyeballs:
-    """Eyeballs over time, the left one first, in the frame of the head.
-
-    centres: (T, 2, 3). gaze: (T, 2, 3), unit vectors. pupils: (T, 2), diameters.
-    """
+    """Centres (T, 2, 3), gaze (unit) and pupils (T, 2) of the eyeballs, left first, in the head's frame."""
 
     centres: Float64
     gaze: Float64
@@ -201,8 +193,7 @@ class FeaturePointFace:
         chin = self.points[row_of()["2.1"]] - self.jaw_hinge
         radius, rest = np.hypot(chin[1], chin[2]), np.arctan2(chin[1], chin[2])
         height = chin[1] - values[:, OPEN_JAW - 1] * self.fapu.MNS
-        angle: Float64 = rest - np.arcsin(np.clip(height / radius, -1.0, 1.0))
-        return angle
+        return np.asarray(rest - np.arcsin(np.clip(height / radius, -1.0, 1.0)))
 
 
 def _as_frames(faps: npt.ArrayLike) -> tuple[Float64, bool]:
@@ -216,8 +207,7 @@ def _as_frames(faps: npt.ArrayLike) -> tuple[Float64, bool]:
 
 
 def _rotate_x(points: Float64, centre: Float64, angle: Float64) -> Float64:
-    """Return (T, N, 3): points (N, 3) rotated about an axis along x by each angle (T,); positive lowers
-    +z."""
+    """Return (T, N, 3): points (N, 3) turned about an axis along x by angles (T,); positive lowers +z."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     y, z = points[:, 1] - centre[1], points[:, 2] - centre[2]
     x = np.broadcast_to(points[:, 0], (len(angle), len(points)))
@@ -227,5 +217,4 @@ def _rotate_x(points: Float64, centre: Float64, angle: Float64) -> Float64:
 def _head_matrices(values: Float64) -> Float64:
     """Return (T, 3, 3): yaw . roll . pitch, the order of the spine's joints; each angle FAP x 1e-5 rad."""
     pitch, yaw, roll = (values[:, n - 1] * 1e-5 for n in (HEAD_PITCH, HEAD_YAW, HEAD_ROLL))
-    matrices: Float64 = axis_matrices(1, yaw) @ axis_matrices(2, roll) @ axis_matrices(0, pitch)
-    return matrices
+    return axis_matrices(1, yaw) @ axis_matrices(2, roll) @ axis_matrices(0, pitch)

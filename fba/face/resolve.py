@@ -22,7 +22,7 @@ from fba.face.mates import fill
 from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
 from fba.tracks import hold
 
-BLOCK = 4096
+RESOLVED_AT_ONCE = 4096
 """Frames resolved at once: keeps the working arrays in the processor's cache."""
 MOUTH_GROUPS = (2, 6, 8)
 """A redefined viseme stores the FAPs of these groups: jaw and inner lip, tongue, outer lip."""
@@ -62,8 +62,7 @@ def resolve(track: FaceTrack, model: FaceSettings | None = None) -> Float32:
 
 
 def known_faps(track: FaceTrack) -> tuple[Int32, Bool]:
-    """Return the values in force of all low-level FAPs at every frame, and masks of those that what was sent
-    determines.
+    """Return the values in force of all low-level FAPs, and masks of those that what was sent determines.
 
     int32 (T, 68) and bool (T, 68): as `resolve` without a model, before visemes and expressions are added.
     """
@@ -130,8 +129,9 @@ class Resolver:
     def push(self, track: FaceTrack) -> Float32:
         """Return the FAPs shown over the next frames: float32 (T, 68), columns 0 and 1 zero."""
         result = np.empty((len(track), FAP_COUNT), dtype=np.float32)
-        for start in range(0, len(track), BLOCK):
-            result[start : start + BLOCK] = self._push_block(track[start : start + BLOCK])
+        for start in range(0, len(track), RESOLVED_AT_ONCE):
+            block = slice(start, start + RESOLVED_AT_ONCE)
+            result[block] = self._push_block(track[block])
         return result
 
     def _push_block(self, track: FaceTrack) -> Float32:
@@ -167,8 +167,7 @@ class Resolver:
         if not fields[:, :2].any():
             return np.zeros((len(track), FAP_COUNT), dtype=np.float32)
         blend = _share(fields[:, 2])
-        shown: Float32 = table.look_up(fields[:, 0]) * blend + table.look_up(fields[:, 1]) * (1 - blend)
-        return shown
+        return table.look_up(fields[:, 0]) * blend + table.look_up(fields[:, 1]) * (1 - blend)
 
     def _expressions_shown(self, track: FaceTrack, fields: Int16) -> Float32:
         defined = track.mask[:, 1] & (track.expression[:, 5] == 1)
@@ -180,8 +179,7 @@ class Resolver:
         # The same expression selected twice is still one: never above its full intensity.
         same = (fields[:, 0] == fields[:, 2])[:, None]
         second = np.where(same, np.minimum(second, 1 - first), second)
-        shown: Float32 = table.look_up(fields[:, 0]) * first + table.look_up(fields[:, 2]) * second
-        return shown
+        return table.look_up(fields[:, 0]) * first + table.look_up(fields[:, 2]) * second
 
 
 @dataclass
@@ -200,11 +198,7 @@ class _State:
     expression: Int16
 
     def hold_low_level(self, track: FaceTrack) -> tuple[Int32, Bool, Bool | None]:
-        """Return the values last sent, masks of the FAPs ever sent and of those to be interpolated, each (T,
-        68).
-
-        The last is None where no FAP is to be interpolated.
-        """
+        """Return (T, 68) values last sent, masks of FAPs ever sent, and to be interpolated (None if none)."""
         if track.mask[:, 2:].all():
             values, sent = track.values, np.ones_like(track.mask)
             sent[:, :2] = np.logical_or.accumulate(track.mask[:, :2], axis=0) | self.sent[:2]

@@ -7,14 +7,13 @@ them.
 
 from __future__ import annotations
 
-import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import cache, lru_cache
-from importlib.resources import files
 
 from fba.parameters import FIRST_LOW_LEVEL_FAP, faps
+from fba.text_files import packaged_rows
 
 SIDES = {"l": "left", "r": "right", "lft": "left", "rgt": "right"}
 MOST_COMMON_WORDS = 3
@@ -27,7 +26,7 @@ WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 @cache
 def arkit_names() -> tuple[str, ...]:
     """Return the 52 names of ARKit's blendshapes, sorted."""
-    return tuple(row["shape"] for row in _rows())
+    return tuple(row["shape"] for row in packaged_rows(__package__, "arkit.csv"))
 
 
 def fap_of(name: str) -> int | None:
@@ -70,15 +69,9 @@ def _begin_alike(names: Sequence[str], count: int) -> bool:
 
 
 @cache
-def _rows() -> tuple[dict[str, str], ...]:
-    with (files(__package__) / "arkit.csv").open(encoding="utf-8") as file:
-        return tuple(csv.DictReader(file))
-
-
-@cache
 def _synonyms() -> dict[frozenset[str], str]:
     shapes: dict[frozenset[str], str] = {}
-    for row in _rows():
+    for row in packaged_rows(__package__, "arkit.csv"):
         for name in (row["shape"], *filter(None, row["synonyms"].split(";"))):
             shapes.setdefault(_words(name), row["shape"])
     return shapes

@@ -4,8 +4,8 @@ read_gltf(path) -> Gltf                  # meshes with morph targets, nodes with
 surfaces(gltf) -> tuple[Surface, ...]    # the surfaces of its scene, all in the frame of the scene
 """
 
+from fba.gltf._accessors import unpack
 from fba.gltf._document import MAX_ITEMS, Document, open_document, parse_json
-from fba.gltf._packed import unpack
 from fba.gltf._part_materials import PartWriter, convert_material, read_material
 from fba.gltf._reader import read_document, read_gltf
 from fba.gltf._scene import Channel, Clip, Gltf, GltfMaterial, GltfMesh, Node, Primitive, Skin

@@ -1,14 +1,18 @@
-"""Accessors of glTF 2.0: typed arrays in the bytes of buffers, plain or sparse."""
+"""Accessors of glTF 2.0: typed arrays in the bytes of buffers, plain, sparse, or packed for this project.
+
+Packed numbers have 32 bits. The lowest bytes of all numbers come first, then all second, third and highest
+ones: the higher bytes of neighbours are much alike, so they deflate well. The result is one zlib stream.
+"""
 
 from __future__ import annotations
 
+import zlib
 from typing import Any
 
 import numpy as np
 
 from fba.arrays import Array, Float32
-from fba.gltf._document import Document
-from fba.gltf._glb import MAX_BYTES
+from fba.gltf._document import MAX_BYTES, Document
 from fba.gltf._values import Value
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -18,6 +22,8 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 UNSIGNED = (5121, 5123, 5125)
 MAX_ELEMENTS = 1 << 22
 """Most elements of one accessor: 4 million vertices or indices."""
+DEFLATE_LEVEL = 7
+"""Level of deflate; level 9 takes four times as long, for files 0.5 % smaller."""
 
 
 class Accessors:
@@ -184,5 +190,32 @@ def _scaled(raw: Array, normalized: bool) -> Float32:
         return raw.astype(np.float32, copy=False)
     top = np.float32(np.iinfo(raw.dtype).max)
     # the lowest signed number would be a little below -1
-    scaled: Float32 = np.maximum(raw.astype(np.float32) / top, np.float32(-1.0))
-    return scaled
+    return np.asarray(np.maximum(raw.astype(np.float32) / top, np.float32(-1.0)))
+
+
+def pack(array: Array) -> bytes:
+    """Return compressed bytes of an array of 32-bit numbers, in its own order."""
+    words = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).ravel()
+    planes = words.view(np.uint8).reshape(-1, 4).T
+    return zlib.compress(planes.tobytes(), DEFLATE_LEVEL)
+
+
+def unpack(document: Document, reference: Value, dtype: type[np.generic], shape: tuple[int, ...]) -> Array:
+    """Return the array of 32-bit numbers in the buffer view that `reference` names; its shape must be known.
+
+    Raises ModelError where the stream is damaged, or holds more or fewer numbers.
+    """
+    count = int(np.prod(shape, dtype=object))
+    document.budget.charge(count * 12, reference)  # as bytes, sorted back, and as the array returned
+    data, view = document.view(reference)
+    stream = zlib.decompressobj()
+    try:
+        raw = stream.decompress(data, count * 4) if count else b""
+        excess = stream.decompress(stream.unconsumed_tail, 1)
+    except zlib.error as error:
+        raise reference.error(f"the packed numbers in {view.path} are damaged ({error})") from None
+    if len(raw) != count * 4 or excess or not stream.eof:
+        raise reference.error(f"{view.path} does not unpack to the {count} numbers that are needed")
+    planes = np.frombuffer(raw, np.uint8).reshape(4, count)
+    words = np.ascontiguousarray(planes.T).view(np.dtype(dtype).newbyteorder("<")).reshape(shape)
+    return words.astype(dtype, copy=False)

@@ -1,4 +1,4 @@
-"""A glTF file opened: its JSON, its buffers, and the files and data URIs that they come from."""
+"""A glTF file opened: container, JSON, buffers, and the files and data URIs that they come from."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import binascii
 import json
 import os
 import re
+import struct
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 from urllib.parse import unquote
 
-from fba.errors import FbaError, ModelError
-from fba.gltf import _glb as glb
+from fba.errors import FbaError, ModelError, warn
 from fba.gltf._meshopt import unpack_view
 from fba.gltf._values import Budget, Value
 from fba.limits import DEFAULT_LIMITS, Limits
@@ -30,6 +30,13 @@ MAX_ITEMS = 1 << 18
 MESHOPT = "EXT_meshopt_compression"
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+MAGIC = b"glTF"
+JSON_CHUNK = b"JSON"
+BIN_CHUNK = b"BIN\0"
+HEADER_BYTES = 12
+CHUNK_HEADER_BYTES = 8
+MAX_BYTES = 1 << 30
+"""Largest file, container or buffer that is read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +70,7 @@ class Document:
             return self._stored(entry), entry
         if index not in self._unpacked:
             data = unpack_view(self._stored(packing), packing, self.budget)
-            length = entry.member("byteLength").integer(1, glb.MAX_BYTES)
+            length = entry.member("byteLength").integer(1, MAX_BYTES)
             if length > len(data):
                 raise entry.error(f"should have {length} bytes, but unpacks to {len(data)}")
             self._unpacked[index] = data[:length]
@@ -73,15 +80,15 @@ class Document:
         """Return the bytes of a buffer that a buffer view, or the extension that packs it, names."""
         buffer = self.buffers[entry.member("buffer").index(len(self.buffers), "buffer")]
         given = entry.get("byteOffset")
-        offset = 0 if given is None else given.integer(0, glb.MAX_BYTES)
-        length = entry.member("byteLength").integer(1, glb.MAX_BYTES)
+        offset = 0 if given is None else given.integer(0, MAX_BYTES)
+        length = entry.member("byteLength").integer(1, MAX_BYTES)
         if offset + length > len(buffer):
             raise entry.error(
                 f"reaches from byte {offset} to {offset + length}, but its buffer has {len(buffer)} bytes"
             )
         return buffer[offset : offset + length]
 
-    def resource(self, uri: Value, most: int = glb.MAX_BYTES) -> bytes:
+    def resource(self, uri: Value, most: int = MAX_BYTES) -> bytes:
         """Return the content of a data URI or a file beside the document; ModelError beyond `most` bytes."""
         if not isinstance(uri.data, str):
             raise uri.error("expected a URI")
@@ -97,7 +104,7 @@ def open_document(path: Path, limits: Limits = DEFAULT_LIMITS) -> Document:
     memory than the limits allow; so does everything that is read from the document later.
     """
     name = os.fspath(path)
-    data = _content(name, glb.MAX_BYTES)
+    data = _content(name, MAX_BYTES)
     folder = os.path.dirname(os.path.abspath(name))
     return parse_document(data, os.path.basename(name) or name, folder, limits)
 
@@ -108,8 +115,8 @@ def parse_document(
     """Return a document from bytes. file: name for messages. folder: of the files that it names, or None."""
     binary: memoryview | None = None
     text = memoryview(data)
-    if data[:4] == glb.MAGIC:
-        text, binary = glb.split_container(data, file)
+    if data[:4] == MAGIC:
+        text, binary = split_container(data, file)
     elif data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
         kind = recognition_hint(data[:HEAD_BYTES])
         raise ModelError(f"{file}: is not glTF 2.0: neither a .glb container nor the JSON of a .gltf{kind}")
@@ -171,7 +178,7 @@ def find_extension(entry: Value, name: str) -> Value | None:
 
 
 def _buffer(document: Document, entry: Value, binary: memoryview | None) -> memoryview:
-    length = entry.member("byteLength").integer(1, glb.MAX_BYTES)
+    length = entry.member("byteLength").integer(1, MAX_BYTES)
     uri = entry.get("uri")
     if uri is None and find_extension(entry, MESHOPT) is not None:
         return memoryview(b"")  # a place for unpacked bytes
@@ -230,3 +237,64 @@ def _content(path: str, most: int, *, start: bool = False) -> bytes:
             return file.read(min(size, most))
         except OSError as error:
             raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def split_container(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
+    """Return the JSON text and the binary chunk (None if absent) of a container.
+
+    data: all bytes of the file. file: its name for messages. Raises ModelError where the container is
+    cut off, of another version, or damaged; bytes after its end are an FbaWarning.
+    """
+    if len(data) < HEADER_BYTES:
+        raise ModelError(f"{file}: header: the file ends after {len(data)} bytes; was it fully copied?")
+    magic, version, length = struct.unpack_from("<4sII", data)
+    if magic != MAGIC:
+        raise ModelError(f"{file}: header: begins with {magic!r}, not with {MAGIC!r}: this is no binary glTF")
+    if version != 2:
+        raise ModelError(f"{file}: header: this is glTF {version}; only glTF 2 is read")
+    if length > len(data):
+        raise ModelError(
+            f"{file}: header: announces {length} bytes, but the file has {len(data)}; was it fully copied?"
+        )
+    if length < len(data):
+        warn(
+            f"{file}: {len(data) - length} bytes after the end of the glTF container are ignored",
+            stacklevel=2,
+        )
+    chunks = _chunks(memoryview(data)[:length], file)
+    if not chunks or chunks[0][0] != JSON_CHUNK:
+        raise ModelError(f"{file}: chunk 0: the first chunk of a glTF container must be its JSON")
+    binary = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == BIN_CHUNK else None
+    return chunks[0][1], binary
+
+
+def _chunks(data: memoryview, file: str) -> list[tuple[bytes, memoryview]]:
+    """Return type and content of the first two chunks; readers may skip those after JSON and bytes."""
+    chunks: list[tuple[bytes, memoryview]] = []
+    position = HEADER_BYTES
+    while position < len(data) and len(chunks) < 2:
+        where = f"{file}: chunk {len(chunks)}"
+        if len(data) - position < CHUNK_HEADER_BYTES:
+            raise ModelError(f"{where}: the container ends within the chunk's header")
+        length, kind = struct.unpack_from("<I4s", data, position)
+        position += CHUNK_HEADER_BYTES
+        if length > len(data) - position:
+            raise ModelError(
+                f"{where}: {length} bytes long, but the container ends after {len(data) - position}"
+            )
+        chunks.append((kind, data[position : position + length]))
+        position += length
+    return chunks
+
+
+def join_container(text: bytes, binary: bytes) -> bytes:
+    """Return a container of JSON and bytes, both padded to 4 bytes. ModelError beyond `MAX_BYTES`."""
+    text += b" " * (-len(text) % 4)
+    binary += b"\0" * (-len(binary) % 4)
+    length = HEADER_BYTES + CHUNK_HEADER_BYTES + len(text) + (CHUNK_HEADER_BYTES + len(binary)) * bool(binary)
+    if length > MAX_BYTES:
+        raise ModelError(f"the glTF container would have {length} bytes, more than the {MAX_BYTES} allowed")
+    parts = [struct.pack("<4sII", MAGIC, 2, length), struct.pack("<I4s", len(text), JSON_CHUNK), text]
+    if binary:
+        parts += [struct.pack("<I4s", len(binary), BIN_CHUNK), binary]
+    return b"".join(parts)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Literal
 
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.gltf._document import Document
 from fba.gltf._scene import GltfMaterial
 from fba.gltf._values import Value, optional_member
@@ -100,4 +99,4 @@ class _Pictures:
             entry, text = self._left_out[0]
             more = len({each.path for each, _ in self._left_out}) - 1
             rest = f" (and so {more} more)" if more else ""
-            warnings.warn(f"{entry.file}: {entry.path}: {text}; left out{rest}", FbaWarning, stacklevel=5)
+            warn(f"{entry.file}: {entry.path}: {text}; left out{rest}", stacklevel=5)

@@ -78,8 +78,7 @@ def _filtered(rows: UInt8, entry: Value) -> Array:
         return _complete_quaternions(rows.view("<i2"))
     if name == "EXPONENTIAL":
         packed = rows.view("<i4")
-        numbers: Array = np.ldexp(((packed << 8) >> 8).astype(np.float32), packed >> 24).astype("<f4")
-        return numbers
+        return np.asarray(np.ldexp(((packed << 8) >> 8).astype(np.float32), packed >> 24).astype("<f4"))
     where = entry if given is None else given
     raise where.error(f"the filter {name!r} does not exist for elements of {stride} bytes")
 

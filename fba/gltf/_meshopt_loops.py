@@ -68,8 +68,7 @@ def unpack_attributes(data: UInt8, out: UInt8) -> int:
 
 @inlined
 def _read_number(data: UInt8, state: Int64, end: int) -> int:
-    """Return the number of 7 bits a byte at state[POSITION], which moves on; -1 where the data end within
-    it."""
+    """Return the number of 7 bits a byte at state[POSITION], which moves on; -1 where data are short."""
     result = 0
     for shift in range(0, 35, 7):
         if state[POSITION] >= end:
@@ -84,8 +83,7 @@ def _read_number(data: UInt8, state: Int64, end: int) -> int:
 
 @inlined
 def _read_index(data: UInt8, state: Int64, end: int) -> int:
-    """Return an index as its difference from the last explicit one, state[LAST]; -1 where the data end within
-    it."""
+    """Return an index stored as its difference from state[LAST]; -1 where the data end within it."""
     number = _read_number(data, state, end)
     if number < 0:
         return -1
@@ -131,8 +129,7 @@ def _third_corner(data: UInt8, vertices: Int64, state: Int64, end: int, code: in
 
 @inlined
 def _free_corner(data: UInt8, vertices: Int64, state: Int64, end: int, code: int) -> int:
-    """Return the second or third corner of a triangle that shares no edge; -1 where the data end within
-    it."""
+    """Return the second or third corner of a triangle that shares no edge; -1 where data are short."""
     if code == 0:
         return _new_vertex(state)
     if code == 15:
@@ -168,10 +165,7 @@ def _free_corners(data: UInt8, vertices: Int64, state: Int64, end: int, code: in
 
 @compiled
 def unpack_triangles(data: UInt8, edges: Int64, vertices: Int64, state: Int64, out: UInt32) -> int:
-    """Write the decoded corners to out (triangles, 3); 0, or -1 where the data do not fit.
-
-    edges: (16, 2), vertices: (16,), state: (5,), all 0: the decoder's memory.
-    """
+    """Write the decoded corners to out (triangles, 3); 0, or -1 for damage. Its memory starts as 0."""
     count = out.shape[0]
     end = len(data) - 16
     state[POSITION] = 1 + count
@@ -197,10 +191,7 @@ def unpack_triangles(data: UInt8, edges: Int64, vertices: Int64, state: Int64, o
 
 @compiled
 def unpack_indices(data: UInt8, state: Int64, last: Int64, out: UInt32) -> int:
-    """Write the decoded indices to out (count,); 0, or -1 where the data do not fit.
-
-    state: (5,), last: (2,), all 0: the decoder's memory.
-    """
+    """Write the decoded indices to out (count,); 0, or -1 for damage. state, last: 0."""
     end = len(data) - 4
     state[POSITION] = 1
     for row in range(len(out)):

@@ -1,5 +1,4 @@
-"""The tree of nodes of a glTF file, with the transforms of every node to its parent and to the scene, and the
-skins: the joints that carry a mesh."""
+"""The tree of nodes of a glTF file, their transforms to parent and scene, and the joints of skins."""
 
 from __future__ import annotations
 
@@ -29,7 +28,10 @@ def read_nodes(
     entries = document.entries("nodes")
     for entry in entries:
         document.budget.charge(2048, entry)
-    children = [_children(entry, len(entries)) for entry in entries]
+    children = [
+        tuple(value.index(len(entries), "node") for value in entry.elements(MAX_ITEMS, "children"))
+        for entry in entries
+    ]
     parents = _parents(entries, children)
     order = _order(entries, children, parents)
     local = [_transform(entry) for entry in entries]
@@ -85,10 +87,6 @@ def read_roots(document: Document, nodes: tuple[Node, ...]) -> tuple[int, ...]:
             )
         roots[root] = None
     return tuple(roots)
-
-
-def _children(entry: Value, count: int) -> tuple[int, ...]:
-    return tuple(value.index(count, "node") for value in entry.elements(MAX_ITEMS, "children"))
 
 
 def _parents(entries: list[Value], children: list[tuple[int, ...]]) -> list[int | None]:

@@ -91,17 +91,19 @@ class PartWriter:
 
 
 def read_material(entry: Value, gltf: Gltf, primitive: Primitive) -> Material:
-    """Return the material of a part. FormatError for a texture without texture coordinates.
+    """Return the material of the part made of a primitive. ModelError for a texture without coordinates.
 
     entry: the part's entry in our extension, which has the material's colour where colours of vertices
-    replace it. primitive: the part.
+    replace it.
     """
     given = entry.get("colour")
     if primitive.material is None:
         return Material()
     material = gltf.materials[primitive.material]
     if material.texture is not None and not primitive.texcoords:
-        raise entry.error("its material has a texture, but its mesh no texture coordinates; leave one out")
+        raise entry.error(
+            "its material has a texture, but its mesh has no texture coordinates; leave one out"
+        )
     read = convert_material(material, material.texture)
     if given is not None:
         red, green, blue = given.numbers(3, 0.0, 1.0)

@@ -6,11 +6,9 @@ JPEG textures, and animations. Everything is checked before it is used or alloca
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.gltf._accessors import Accessors
 from fba.gltf._document import MAX_ITEMS, Document, open_document
 from fba.gltf._materials import read_materials
@@ -21,9 +19,7 @@ from fba.gltf._values import Value
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
-PACKED = {
-    "KHR_meshopt_compression": "meshopt-compressed buffers",
-}
+PACKED = {"KHR_meshopt_compression": "meshopt-compressed buffers"}
 """Extensions by which the geometry itself is compressed."""
 KNOWN = {
     "KHR_draco_mesh_compression",
@@ -83,7 +79,7 @@ def _check_extensions(document: Document) -> None:
             )
         if name not in KNOWN and not name.startswith("KHR_materials_"):
             if "texture" in name:  # another kind of picture: shapes can be read without it
-                warnings.warn(f"{entry.file}: {name} cannot be read; left out", FbaWarning, stacklevel=3)
+                warn(f"{entry.file}: {name} cannot be read; left out", stacklevel=3)
                 continue
             raise entry.error(f"the file needs the extension {name}, which fba does not support")
 

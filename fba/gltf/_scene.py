@@ -86,10 +86,7 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """The joints that carry a mesh.
-
-    joints: indices of nodes. inverse_bind: float64 (J, 4, 4), from the mesh's frame to each joint's.
-    """
+    """Joints that carry a mesh: nodes, and (J, 4, 4) from the mesh's frame to each joint's."""
 
     name: str
     joints: tuple[int, ...]

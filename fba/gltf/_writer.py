@@ -11,11 +11,9 @@ import numpy.typing as npt
 from fba.arrays import Array, Floating
 from fba.atomic import atomic
 from fba.errors import ModelError
-from fba.gltf._accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS
-from fba.gltf._document import MAX_JSON
-from fba.gltf._glb import MAX_BYTES, join_container
+from fba.gltf._accessors import COMPONENTS, MAX_ELEMENTS, WIDTHS, pack
+from fba.gltf._document import MAX_BYTES, MAX_JSON, join_container
 from fba.gltf._materials import WEBP, media_type
-from fba.gltf._packed import pack
 from fba.source import Path
 
 ATTRIBUTES = 34962
@@ -195,11 +193,7 @@ class Builder:
 def _entry(array: Array, bounds: bool) -> dict[str, Any]:
     if not 1 <= len(array) <= MAX_ELEMENTS:
         raise ModelError(f"a glTF accessor holds 1 to {MAX_ELEMENTS} elements, not {len(array)}")
-    entry = {
-        "componentType": _CODES[array.dtype],
-        "count": len(array),
-        "type": _TYPES[array.shape[1]],
-    }
+    entry = {"componentType": _CODES[array.dtype], "count": len(array), "type": _TYPES[array.shape[1]]}
     if bounds:
         entry |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
     return entry

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.gltf._scene import Gltf, GltfMaterial, Node, Primitive
 from fba.mesh import UniqueNames
 
@@ -106,7 +105,7 @@ def _surface(
         if morph is not None
     }
     if len(set(names)) < len(names):
-        warnings.warn(f"{gltf.file}: {name}: two morph targets have the same name", FbaWarning, stacklevel=3)
+        warn(f"{gltf.file}: {name}: two morph targets have the same name", stacklevel=3)
     placed = positions.astype(np.float32)
     if not all(np.isfinite(array).all() for array in (placed, *morphs.values())):
         raise gltf.document.error(f"nodes[{number}]: positions overflow in the frame of the scene")
@@ -128,10 +127,7 @@ def _surface(
 
 
 def _frames(gltf: Gltf, node: Node, primitive: Primitive, of_skins: dict[int, Float64]) -> Float64:
-    """Return the node's matrix, float64 (4, 4), or one for each vertex of a skin, (V, 4, 4).
-
-    of_skins: matrices of the joints of each skin, computed once: many nodes may have the same.
-    """
+    """Return the node's matrix (4, 4), or one a vertex (V, 4, 4) of a skin, cached in `of_skins`."""
     if node.skin is None or primitive.joints is None or primitive.weights is None:
         return node.world
     if node.skin not in of_skins:
@@ -150,8 +146,7 @@ def _frames(gltf: Gltf, node: Node, primitive: Primitive, of_skins: dict[int, Fl
 
 
 def _moved(linear: Float64, vectors: Float32) -> Float64:
-    result: Float64 = np.einsum("...ij,...j->...i", linear, vectors.astype(np.float64))
-    return result
+    return np.asarray(np.einsum("...ij,...j->...i", linear, vectors.astype(np.float64)))
 
 
 def _turned(linear: Float64, normals: Float32) -> Float32:

@@ -1,23 +1,20 @@
-"""Triangle meshes: materials, normals, checks, and readers of mesh files (OBJ, PLY, VRML, WFM).
+"""Triangle meshes: materials, normals, checks, and readers of mesh files (OBJ, PLY, VRML, WFM)."""
 
-May use: errors, files, arrays. Knows no face and no body.
-"""
-
+from fba.mesh._materials import Pictures, read_mtl, read_pixels
 from fba.mesh._meshes import (
     Alpha,
     Material,
     Mesh,
     Meshes,
+    UniqueNames,
     checked_rows,
+    connected,
     join_rows,
     mesh_arrays,
     result_array,
     vertex_normals,
 )
-from fba.mesh._mtl import Pictures, read_mtl
-from fba.mesh._names import UniqueNames
 from fba.mesh._obj import read_obj
-from fba.mesh._pictures import read_pixels
 from fba.mesh._ply import read_ply
 from fba.mesh._polygons import Polygons, triangulate
 from fba.mesh._vrml import read_vrml
@@ -32,6 +29,7 @@ __all__ = [
     "Polygons",
     "UniqueNames",
     "checked_rows",
+    "connected",
     "join_rows",
     "mesh_arrays",
     "read_mtl",

@@ -1,8 +1,8 @@
-"""Materials, vertex normals and checked arrays of the meshes of faces and bodies."""
+"""Materials, vertex normals, checked arrays and unique names of the meshes of faces and bodies."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, Literal, Protocol, TypeVar
@@ -10,7 +10,7 @@ from typing import Any, Generic, Literal, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float32, Floating, Int32, Integer
+from fba.arrays import Float32, Floating, Int32, Integer, Intp
 from fba.errors import ModelError
 
 Alpha = Literal["auto", "opaque", "mask", "blend"]
@@ -169,6 +169,15 @@ def join_rows(arrays: Sequence[npt.NDArray[Number]]) -> npt.NDArray[Number]:
     return rows
 
 
+def connected(edges: Integer, count: int) -> Intp:
+    """Return (count,) number of the connected piece of each vertex. edges: (E, 2), between two vertices."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.intp)
+
+
 def result_array(shape: tuple[int, ...], out: Float32 | None, normals: Float32 | None) -> Float32:
     """Return the array to write vertices to: `out`, or a new one if None. Both given arrays are checked.
 
@@ -190,3 +199,24 @@ def _check_target(target: Any, shape: tuple[int, ...], name: str) -> None:
         raise ValueError(f"{name} must be a float32 array of shape {shape}, not {found}")
     if not (target.flags.c_contiguous and target.flags.writeable):
         raise ValueError(f"{name} must be C-contiguous and writable")
+
+
+class UniqueNames:
+    """Gives names, numbered where they are taken: "skin", "skin 2", "skin 3".
+
+    taken: names that are not given. The time for each name does not grow with the number of equal ones.
+    """
+
+    def __init__(self, taken: Iterable[str] = ()) -> None:
+        self._last = dict.fromkeys(taken, 1)
+
+    def __call__(self, name: str) -> str:
+        """Return the name, or the name with the next free number; it is taken from now on."""
+        number = self._last.get(name, 0) + 1
+        unique = name
+        if number > 1:
+            while (unique := f"{name} {number}") in self._last:
+                number += 1
+            self._last[unique] = 1
+        self._last[name] = number
+        return unique

@@ -126,7 +126,8 @@ class _Reader:
         self.group.append(self.groups.setdefault((self.names[0], self.names[1]), len(self.groups)))
 
     def _index(self, token: str, count: int, what: str) -> int:
-        index = int(token) if token.isdecimal() and len(token) < 9 else self._signed(token, what)
+        plain = token.isdecimal() and len(token) < 9
+        index = int(token) if plain else parse_integer(token, self.where, f"the number of a {what}")
         position = index - 1 if index > 0 else count + index
         if index == 0 or not 0 <= position < count:
             raise ModelError(
@@ -134,9 +135,6 @@ class _Reader:
                 "counted from 1, or from -1 backwards"
             )
         return position
-
-    def _signed(self, token: str, what: str) -> int:
-        return parse_integer(token, self.where, f"the number of a {what}")
 
 
 def _linear(colour: Float32) -> Float32:

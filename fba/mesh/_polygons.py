@@ -88,5 +88,4 @@ def strip_triangles(starts: Int64, corners: Int64) -> Int64:
     triangles[turned] = triangles[turned][:, [1, 0, 2]]
     first, second, last = triangles.T
     kept = (first != second) & (second != last) & (first != last)
-    result: Int64 = triangles[kept].reshape(-1)
-    return result
+    return np.asarray(triangles[kept].reshape(-1))

@@ -18,10 +18,7 @@ LISTS = ("point", "coordIndex", "texCoordIndex")
 
 
 def read_vrml(path: str | os.PathLike[str]) -> list[Polygons]:
-    """Return each IndexedFaceSet of a VRML file in order, in the file's unit; transforms are not applied.
-
-    Raises ModelError where the file is damaged or has none.
-    """
+    """Return a file's IndexedFaceSets in its unit, transforms not applied. ModelError without any."""
     return _Reader(os.fspath(path)).read()
 
 

@@ -11,10 +11,9 @@ from fba.arrays import Bool, Float32, Float64, Int32
 from fba.codec import EncoderOptions, EncoderStatistics, decode
 from fba.errors import ModelError, OptionError
 from fba.face import Deformer, FaceModel, resolve
-from fba.face.deform.displacements import vertex_distances
+from fba.face.deform.displacements import unit_motions, vertex_distances
 from fba.face.learning import Spread, send_sources
 from fba.face.learning.reduction import linked_columns
-from fba.face.learning.sensitivity import displacements
 from fba.face.resolve import known_faps
 from fba.planning._derived_faps import interpolated_faps
 from fba.planning._plan import encode_planned
@@ -97,8 +96,8 @@ def encode_with_fit(
 
 
 def _missed(wanted: Float32, shown: Float32, deformer: Deformer, most_off: float) -> Bool:
-    """Return bool (68,): FAPs that are off by more than this distance in metres."""
-    reach = np.linalg.norm(displacements(deformer), axis=2).max(axis=1, initial=0.0) / 1000
+    """Return bool (68,): FAPs that are further off than this distance in metres."""
+    reach = np.linalg.norm(unit_motions(deformer), axis=2).max(axis=1, initial=0.0) / 1000
     missed: Bool = np.abs(shown - wanted).max(axis=0) * reach > most_off
     return missed
 

@@ -18,8 +18,7 @@ from fba.body import BapSolver, Skeleton
 from fba.body._storage import build, read_body
 from fba.body.model import BodyModel, BodyPart
 from fba.errors import FormatError, ModelError
-from fba.gltf._document import parse_document
-from fba.gltf._glb import join_container, split_container
+from fba.gltf._document import join_container, parse_document, split_container
 from fba.gltf._reader import read_document
 from fba.gltf.surfaces import surfaces
 from fba.parameters import joints

@@ -13,9 +13,8 @@ import pytest
 from fba import Decoder, FormatError
 from fba_conformance._values import Listing, PlaneValues, block_values, read_values
 from fba_conformance.suite import example_program, programs
-from fba_conformance.suite._process import run_program
 from fba_conformance.suite.index import Vector, read_vectors
-from fba_conformance.suite.programs import Program, check_decoder, check_encoder, parse_program
+from fba_conformance.suite.programs import Program, check_decoder, check_encoder, parse_program, run_program
 from fba_conformance.suite.runner import expected_listing
 from tools.vectors import broken
 
@@ -114,7 +113,7 @@ def test_a_crash_is_named_and_children_are_stopped(tmp_path: Path) -> None:
 
 
 def test_endless_output_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fba_conformance.suite._process.OUTPUT_LIMIT", 1 << 20)
+    monkeypatch.setattr("fba_conformance.suite.programs.OUTPUT_LIMIT", 1 << 20)
     endless = "f = out.open('wb')\nwhile True: f.write(bytes(4096)); sys.stderr.write('x' * 999)"
     words = [sys.executable, "-I", "-S", "-c", START.replace("; ", "\n") + endless, "in"]
     found = run_program([*words, str(tmp_path / "out")], tmp_path / "out", 60)

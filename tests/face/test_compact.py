@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fba.face._compact import compact
 from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.deform._deformer import Deformer
 from fba.face.gltf._storage import load
+from fba.face.model import compact
 from stored_models import face
 
 

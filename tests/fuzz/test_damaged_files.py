@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from fba.gltf._glb import join_container, split_container
+from fba.gltf._document import join_container, split_container
 from tools.fuzz import _engine as engine
 from tools.fuzz.corpus import read_corpus
 from tools.fuzz.targets import find_target, targets

@@ -156,16 +156,13 @@ READING = {
     "face": ("fba.face.gltf._reading",),
     "body": ("fba.body._storage",),
     "obj": ("fba.mesh._obj",),
-    "mtl": ("fba.mesh._mtl",),
+    "mtl": ("fba.mesh._materials",),
     "ply": ("fba.mesh._ply",),
     "vrml": ("fba.mesh._vrml",),
     "wfm": ("fba.mesh._wfm",),
-    "points": (
-        "fba.face.importers.points.points_file", "fba.face.importers.points.fdp",
-        "fba.face.importers.points.xface",
-    ),
+    "points": ("fba.face.importers.points.points_file", "fba.face.importers.points.fdp"),
     "mapping": ("fba.capture.virtual_markers._mapping_files",),
-    "import": ("fba.face.importers._mesh", "fba.face.importers._gltf", "fba.face.importers._fdp"),
+    "import": ("fba.face.importers._mesh", "fba.face.importers._gltf", "fba.face.importers._mesh"),
     "cache": ("fba.cache",),
 }  # fmt: skip
 """Modules that read what each target is fed with."""

@@ -11,7 +11,7 @@ from fba import text_files
 from fba.errors import FbaWarning, ModelError
 from fba.face.importers.assembly._polygon_parts import make_piece
 from fba.mesh import _obj as obj
-from fba.mesh._mtl import read_mtl
+from fba.mesh._materials import read_mtl
 from fba.mesh._obj import read_obj
 from fba.mesh._polygons import triangulate
 

@@ -2,5 +2,4 @@
 
 `fba conformance` runs it on this codec or on other programs. In a checkout, `tools/vectors` makes the
 vectors, and measures what they reach and which faulty decoders they find.
-May use: the second decoder, the codec's public names, formats.
 """

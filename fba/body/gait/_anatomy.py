@@ -5,15 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.arrays import Float64, Int32
-from fba.body.gait._limb import ELBOW, KNEE, Limb
 from fba.body.skeleton import ROOT, Skeleton
 from fba.body.solve.conventions import convention
 from fba.choices import Axes
 from fba.errors import ModelError
+from fba.rotations import apply, axis_matrices
 
+KNEE = 1.0
+"""Sense in which a knee bends: about +x, backward."""
+ELBOW = -1.0
+"""Sense in which an elbow bends: about -x, forward."""
 HEEL_BEHIND = 0.054
 """Metres from the ankle's centre back to where the heel touches, for the default body."""
 TOES_AHEAD = 0.062
@@ -22,6 +27,78 @@ HIP_HEIGHT = 0.9364
 """Height of the default body's hips, metres; a body's scale is the height of its hips divided by this."""
 PALMS = ("middle0", "middle1", "index0", "wrist")
 """Joints that may represent the palm; the first that the skeleton has is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """A limb of two bones (3,), in the default posture, metres. sense: `KNEE` or `ELBOW`."""
+
+    upper: Float64
+    lower: Float64
+    sense: float
+
+    def _hinge(self) -> tuple[float, float, float]:
+        """Return constant, m, straight: the squared reach at a bend b is constant + 2 m cos(b - straight)."""
+        u, w = self.upper, self.lower
+        along, across = u[1] * w[1] + u[2] * w[2], u[2] * w[1] - u[1] * w[2]
+        constant = float(u @ u + w @ w + 2.0 * u[0] * w[0])
+        return constant, float(np.hypot(along, across)), float(np.arctan2(across, along))
+
+    @property
+    def reach(self) -> float:
+        """Length of the straight limb from end to end, metres."""
+        constant, m, _ = self._hinge()
+        return float(np.sqrt(constant + 2.0 * m))
+
+    def length(self, bend: npt.ArrayLike) -> Float64:
+        """Return metres from end to end at a bend, radians (the rotation about x, times `sense`)."""
+        constant, m, straight = self._hinge()
+        return np.sqrt(
+            constant + 2.0 * m * np.cos(self.sense * np.asarray(bend, dtype=np.float64) - straight)
+        )
+
+    def bend(self, length: npt.ArrayLike) -> Float64:
+        """Return the bend, radians, at which the ends are `length` metres apart, or as nearly as possible."""
+        constant, m, straight = self._hinge()
+        cosine = (np.square(np.asarray(length, dtype=np.float64)) - constant) / (2.0 * m)
+        return self.sense * straight + np.arccos(np.clip(cosine, -1.0, 1.0))
+
+    def solve(self, target: Float64, twist: npt.ArrayLike) -> tuple[Float64, Float64]:
+        """Return rotations (..., 3, 3) of the upper bone, and bends (...), that bring the end to a target.
+
+        target: (..., 3), from the limb's root, in the frame of its parent. twist: angle about the upper bone
+        itself, the innermost of its rotations (abduction, then flexion follow). The limb points at a target
+        that is out of reach.
+        """
+        twist = np.asarray(twist, dtype=np.float64)
+        bend = self.bend(np.linalg.norm(target, axis=-1))
+        end = self.upper + apply(axis_matrices(0, self.sense * bend), self.lower)
+        end = apply(axis_matrices(1, twist), end)
+        scale = np.linalg.norm(end, axis=-1) / np.linalg.norm(target, axis=-1)
+        wanted = target * scale[..., None]
+        flat = np.hypot(end[..., 0], end[..., 1])
+        abduction = -np.arccos(np.clip(wanted[..., 0] / flat, -1.0, 1.0)) - np.arctan2(
+            end[..., 1], end[..., 0]
+        )
+        abducted = apply(axis_matrices(2, abduction), end)
+        flexion = np.arctan2(wanted[..., 2], wanted[..., 1]) - np.arctan2(abducted[..., 2], abducted[..., 1])
+        return axis_matrices(0, flexion) @ axis_matrices(2, abduction) @ axis_matrices(1, twist), bend
+
+
+def limb_angles(rotation: Float64) -> tuple[Float64, Float64, Float64]:
+    """Return angles x, y, z of rotations (..., 3, 3) = Rx . Rz . Ry, of a limb: flexion is outermost."""
+    z = np.arcsin(np.clip(-rotation[..., 0, 1], -1.0, 1.0))
+    x = np.arctan2(rotation[..., 2, 1], rotation[..., 1, 1])
+    y = np.arctan2(rotation[..., 0, 2], rotation[..., 0, 0])
+    return x, y, z
+
+
+def foot_angles(rotation: Float64) -> tuple[Float64, Float64, Float64]:
+    """Return angles x, y, z of rotations (..., 3, 3) = Rx . Ry . Rz, of a foot: ankle, then subtalar."""
+    y = np.arcsin(np.clip(rotation[..., 0, 2], -1.0, 1.0))
+    x = np.arctan2(-rotation[..., 1, 2], rotation[..., 2, 2])
+    z = np.arctan2(-rotation[..., 0, 1], rotation[..., 0, 0])
+    return x, y, z
 
 
 @dataclass(frozen=True, eq=False)

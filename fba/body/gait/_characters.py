@@ -10,7 +10,6 @@ half the sides are exchanged. A cell that a character leaves empty is as in `nor
 
 from __future__ import annotations
 
-import csv
 import difflib
 import json
 from collections.abc import Mapping
@@ -22,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from fba.errors import ModelError
+from fba.text_files import packaged_rows
 
 POSES = ("extended", "recoil", "passing", "anticipation")
 LEGS = ("stance", "swing")
@@ -214,15 +214,15 @@ def characters() -> tuple[str, ...]:
 
 @cache
 def _characters() -> dict[str, Character]:
-    folder = files(__package__)
-    table: dict[str, Any] = json.loads((folder / "characters.json").read_text(encoding="utf-8"))
+    text = (files(__package__) / "characters.json").read_text(encoding="utf-8")
+    table: dict[str, Any] = json.loads(text)
     poses: dict[tuple[str, str, str], Pose] = {}
-    for row in csv.DictReader((folder / "poses.csv").read_text(encoding="utf-8").splitlines()):
+    for row in packaged_rows(__package__, "poses.csv"):
         base = poses.get(("normal", row["pose"], row["leg"]))
         cells = {f: float(row[f]) if row[f] else getattr(base, f, 0.0) for f in _FIELDS}
         poses[row["character"], row["pose"], row["leg"]] = Pose(**cells)
     corrections: dict[str, dict[str, tuple[tuple[float, float], ...]]] = {}
-    for row in csv.DictReader((folder / "corrections.csv").read_text(encoding="utf-8").splitlines()):
+    for row in packaged_rows(__package__, "corrections.csv"):
         curves = corrections.setdefault(row["character"], {})
         curves[row["curve"]] = (*curves.get(row["curve"], ()), (float(row["phase"]), float(row["value"])))
     result = {}

@@ -56,10 +56,7 @@ def periodic_curve(
 def spline(
     knots: npt.ArrayLike, values: Float64, first: Float64, last: Float64, phase: npt.ArrayLike
 ) -> Float64:
-    """Return the values at phases of the cubic spline through values (K, ...) at knots (K,).
-
-    first, last: (...), its slopes at both ends.
-    """
+    """Return the cubic spline through values (K, ...) at knots (K,) with these end slopes, at phases."""
     x, y = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
     count, h = len(x), np.diff(x)
     slope = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))
@@ -80,5 +77,4 @@ def spline(
 def _hermite(s: Float64, step: Float64, y0: Float64, y1: Float64, d0: Float64, d1: Float64) -> Float64:
     """Return the cubic with values y0, y1 and slopes d0, d1 at its ends, at fractions s of the step."""
     t = 1.0 - s
-    result: Float64 = t * t * ((1 + 2 * s) * y0 + s * step * d0) + s * s * ((1 + 2 * t) * y1 - t * step * d1)
-    return result
+    return t * t * ((1 + 2 * s) * y0 + s * step * d0) + s * s * ((1 + 2 * t) * y1 - t * step * d1)

@@ -147,8 +147,7 @@ def _smooth(curve: Float64, width: float) -> Float64:
         return curve.copy()
     from scipy.ndimage import gaussian_filter1d
 
-    result: Float64 = gaussian_filter1d(curve, width, axis=0, mode="nearest")
-    return result
+    return np.asarray(gaussian_filter1d(curve, width, axis=0, mode="nearest"))
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64
-from fba.body.gait._anatomy import Side
-from fba.body.gait._limb import foot_angles, limb_angles
+from fba.body.gait._anatomy import Side, foot_angles, limb_angles
 from fba.easing import smoothstep
 from fba.rotations import apply, axis_matrices
 
@@ -25,10 +24,7 @@ _RISEN = np.sin(np.radians(12.0))
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """Poses of one foot over T frames, float64.
-
-    turn: (T, 3, 3) rotation of the foot. subtalar: (T, 3) position of its joint, metres.
-    """
+    """One foot over T frames: turn (T, 3, 3), and position of its subtalar joint (T, 3), metres."""
 
     turn: Float64
     subtalar: Float64
@@ -113,8 +109,7 @@ def lowest_height(side: Side, footing: Footing, toes: Float64 | float = 0.0) -> 
     bent = footing.turn @ axis_matrices(0, -np.broadcast_to(toes, footing.subtalar.shape[:-1]))
     ball = joint + apply(footing.turn, side.tip * (0.0, 1.0, 0.0))
     tip = joint + apply(bent, side.tip)
-    result: Float64 = np.minimum(np.minimum(heel[..., 1], ball[..., 1]), tip[..., 1])
-    return result
+    return np.minimum(np.minimum(heel[..., 1], ball[..., 1]), tip[..., 1])
 
 
 def hip_angles(pelvis: Float64, thigh: Float64) -> tuple[Float64, Float64, Float64]:
@@ -137,5 +132,4 @@ def hip_height(side: Side, hip: Float64, ankle: Float64, bend: Float64) -> Float
     """Return (T,) height of the hip above the ground, metres, at which the leg to the ankle has that bend."""
     gap = hip - ankle
     rest = np.square(side.leg.length(bend)) - np.square(gap[..., 0]) - np.square(gap[..., 2])
-    result: Float64 = ankle[..., 1] + np.sqrt(np.maximum(rest, 1e-6))
-    return result
+    return np.asarray(ankle[..., 1] + np.sqrt(np.maximum(rest, 1e-6)))

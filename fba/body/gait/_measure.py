@@ -31,8 +31,7 @@ class Soles:
     @property
     def touching(self) -> Bool:
         """(2, 3, T) mask of the points on the ground."""
-        result: Bool = self.points[..., 1] <= ON_GROUND
-        return result
+        return self.points[..., 1] <= ON_GROUND
 
     @property
     def deepest(self) -> float:

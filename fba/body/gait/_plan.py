@@ -12,11 +12,10 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.body.gait import _ground as ground
-from fba.body.gait._anatomy import Anatomy, Side
+from fba.body.gait._anatomy import Anatomy, Side, limb_angles
 from fba.body.gait._characters import CYCLE, PHASES, Character
 from fba.body.gait._curves import Interpolation, cosine_wave, periodic_curve, spline
 from fba.body.gait._ground import Footing, Leg
-from fba.body.gait._limb import limb_angles
 from fba.easing import smoothstep
 from fba.errors import ModelError
 from fba.rotations import axis_matrices
@@ -60,16 +59,14 @@ class Plan:
         foot[0] *= ratio
         foot[4:6] *= 0.3 + 0.7 * ratio
         foot[6:] *= 0.6 + 0.4 * ratio
-        result: Float64 = np.radians(foot)
-        return result
+        return np.radians(foot)
 
     @cached_property
     def _knee(self) -> Float64:
         """(8,) bend of the knee in the poses, radians."""
         knee = np.array(self.character.curve("knee"), dtype=np.float64)
         knee[5:7] *= 0.55 + 0.45 * np.clip(self.stride_ratio, 0.0, 1.3)
-        result: Float64 = np.radians(knee)
-        return result
+        return np.radians(knee)
 
     @property
     def _toe_off(self) -> float:
@@ -103,8 +100,7 @@ class Plan:
         knots, values = np.array([(0.0, 0.0), (self._toe_off, 0.0), *points]).T
         share = np.clip(self.stride_ratio, 0.0, 1.0)
         degrees = periodic_curve(knots, values, np.mod(phase, 1.0), self.interpolation)
-        result: Float64 = share * degrees
-        return result
+        return np.asarray(share * degrees)
 
     def knee(self, phase: Float64) -> Float64:
         """Return (T,) bend of the knee by the poses, at phases of its own leg, radians."""

@@ -80,10 +80,7 @@ class Errors:
 
 
 def reduce(animation: Animation, gait: Gait | None = None, skeleton: Skeleton | None = None) -> Reduced:
-    """Return a motion reduced to the poses of its gait; ValueError without steps.
-
-    gait: of the animation; by default what `detect` returns. skeleton: as of `detect`.
-    """
+    """Return a motion reduced to the poses of its gait, by default `detect`'s; ValueError without steps."""
     gait = detect(animation, skeleton) if gait is None else gait
     keys = gait.keys
     if not keys:
@@ -145,5 +142,4 @@ def _local_rotations(matrices: Float64, skeleton: Skeleton) -> Float64:
 def _angles_between(a: Float64, b: Float64) -> Float64:
     """Return the angles between rotations, radians, from their chords, which stay accurate near 0."""
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
-    result: Float64 = 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
-    return result
+    return np.asarray(2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)))

@@ -12,10 +12,9 @@ import numpy as np
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64
 from fba.body.gait import _ground as ground
-from fba.body.gait._anatomy import Anatomy, Side, Writer
+from fba.body.gait._anatomy import Anatomy, Side, Writer, limb_angles
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import Interpolation, check_interpolation, cosine_wave, periodic_curve
-from fba.body.gait._limb import limb_angles
 from fba.body.gait._plan import KNOTS, MIN_STRIDE, Plan, make_plan
 from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
@@ -217,8 +216,7 @@ def _palm_goals(side: Side, character: Character, size: float) -> Float64:
     forward = forward.mean() + swing * np.clip(size, 0.0, 1.4)
     goal = np.stack([side.sign * out, -down, forward], axis=-1) * side.arm.reach
     length = np.linalg.norm(goal, axis=-1, keepdims=True)
-    result: Float64 = goal * np.minimum(1.0, _REACH * side.arm.reach / length)
-    return result
+    return np.asarray(goal * np.minimum(1.0, _REACH * side.arm.reach / length))
 
 
 def swing_arms(writer: Writer, plan: Plan, phase: Float64) -> None:

@@ -8,11 +8,9 @@ and bones of the rig for each joint of the standard; the vertebrae are distribut
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Mapping
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -31,8 +29,8 @@ from fba.body.solve._bind_pose import (
 from fba.easing import smoothstep
 from fba.errors import FormatError, ModelError
 from fba.gltf import MAX_ITEMS, Value, parse_json
-from fba.mesh import Polygons, read_obj, triangulate, vertex_normals
-from fba.text_files import read_bytes
+from fba.mesh import Polygons, connected, read_obj, triangulate, vertex_normals
+from fba.text_files import packaged_rows, read_bytes
 
 METRES = 0.1
 """Metres per unit of the base mesh."""
@@ -49,7 +47,6 @@ TRUNK = (
     "breast.L",
     "breast.R",
 )
-HEAD = "head"
 BLADE_FROM = 0.3
 """Share of the distance from breastbone to arm at which weights begin to pass to the shoulder blade."""
 BLADE_AT = 0.75
@@ -115,8 +112,7 @@ class _RigPositions:
         rows = [value.index(len(self._vertices), "vertex") for value in entry.elements(1000)]
         if not rows:
             raise entry.error("a joint needs at least one vertex")
-        middle: Float64 = self._vertices[rows].mean(axis=0)
-        return middle
+        return np.asarray(self._vertices[rows].mean(axis=0))
 
 
 def _json(path: Path) -> Value:
@@ -150,12 +146,11 @@ def _rig(rig: Value, vertices: Float64) -> tuple[dict[str, str | None], _RigPosi
 def _rows() -> tuple[tuple[str, str, str, float, tuple[str, ...]], ...]:
     """Return rows (joint, from, to, share, bones) of makehuman.csv, for both sides."""
     rows = []
-    with (files(__package__) / "makehuman.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            for side, rig_side in (("l", "L"), ("r", "R")) if "?" in row["joint"] else (("", ""),):
-                words = [row[key].replace("?", rig_side) for key in ("from", "to", "bones")]
-                joint = row["joint"].replace("?", side)
-                rows.append((joint, words[0], words[1], float(row["share"]), tuple(words[2].split())))
+    for row in packaged_rows(__package__, "makehuman.csv"):
+        for side, rig_side in (("l", "L"), ("r", "R")) if "?" in row["joint"] else (("", ""),):
+            words = [row[key].replace("?", rig_side) for key in ("from", "to", "bones")]
+            joint = row["joint"].replace("?", side)
+            rows.append((joint, words[0], words[1], float(row["share"]), tuple(words[2].split())))
     return tuple(rows)
 
 
@@ -222,8 +217,7 @@ def _weights(content: Value, bones: dict[str, str | None], vertices: Float64, po
             weights[:, skull] += given[bone]
     total = weights.sum(axis=1, keepdims=True)
     weights[total[:, 0] <= 0, skull] = 1.0
-    normalised: Float64 = weights / weights.sum(axis=1, keepdims=True)
-    return normalised
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def _eye_radius(mesh: Polygons, vertices: Float64) -> float:
@@ -233,23 +227,17 @@ def _eye_radius(mesh: Polygons, vertices: Float64) -> float:
 
 @cache
 def _neckline() -> tuple[int, ...]:
-    with (files(__package__) / "makehuman_neck.csv").open(encoding="utf-8") as file:
-        return tuple(int(row["vertex"]) for row in csv.DictReader(file))
+    return tuple(int(row["vertex"]) for row in packaged_rows(__package__, "makehuman_neck.csv"))
 
 
 def _above_neckline(triangles: Int64, vertices: Float64) -> Bool:
     """Return (F,) mask of the triangles above the neckline, where head models made of this mesh end too."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     sides = sides[~np.isin(sides, _neckline()).any(axis=1)]
-    links = (np.ones(len(sides)), (sides[:, 0], sides[:, 1]))
-    _, label = connected_components(coo_array(links, shape=(len(vertices),) * 2), directed=False)
+    label = connected(sides, len(vertices))
     used = np.unique(triangles)
     crown = used[vertices[used, 1].argmax()]
-    above: Bool = (label[triangles] == label[crown]).any(axis=1)
-    return above
+    return np.asarray((label[triangles] == label[crown]).any(axis=1))
 
 
 def _parts(mesh: Polygons, vertices: Float64, weights: Float64) -> tuple[BodyPart, ...]:

@@ -1,4 +1,1 @@
-"""Skinning, vertices moved by joints: dual quaternions, twists, shoulders, normals.
-
-May use: the skeleton, compiled loops.
-"""
+"""Skinning, vertices moved by joints: dual quaternions, twists, shoulders, normals."""

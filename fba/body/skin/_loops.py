@@ -21,7 +21,7 @@ from fba.easing import smoothstep_of_one
 
 
 class Twisting(NamedTuple):
-    """Vertices that are turned about B bones before skinning: see `fba.body.skin._twisting`."""
+    """Vertices that are turned about B bones before skinning: see `fba.body.skin._skinning`."""
 
     rows: Int64
     shares: Float64
@@ -149,7 +149,7 @@ def joint_duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Floa
 def _twist_limbs(
     vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, twisted: Float32
 ) -> None:
-    """Write to `twisted` vertices of limbs turned about their bones: see `fba.body.skin._twisting`."""
+    """Write to `twisted` vertices of limbs turned about their bones: see `fba.body.skin._skinning`."""
     for bone in range(len(twists.joint)):
         own = twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
         child = twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
@@ -168,10 +168,7 @@ def _twist_limbs(
 
 @inlined
 def twist(duals: Float32, parents: Int64, joint: int, axis: Float64) -> float:
-    """Return the angle by which a joint turns about an axis, seen from its parent, radians.
-
-    It fades to 0 where the limb is turned back on itself, as its twist is undefined there.
-    """
+    """Return a joint's turn about an axis, radians, fading to 0 where the limb is turned back on itself."""
     parent = int(parents[joint])
     if parent < 0:
         return 0.0
@@ -214,10 +211,7 @@ def _quaternion(s: Float64) -> tuple[float, float, float, float]:
 
 @compiled
 def _skin_dual(vertices: Float32, skin: Skin, out: Float32, normals: Float32) -> None:
-    """Fill `out` with one frame, and normals of the vertices that have no neighbours to compute them from.
-
-    vertices: (V, 3), after limbs were twisted. normals: (V, 3), or (0, 3) for none.
-    """
+    """Fill `out` with twisted vertices (V, 3) of one frame, and normals of those without neighbours."""
     joints, weights, counts, neighbours = skin.joints, skin.weights, skin.counts, skin.neighbours
     rest_normals, duals = skin.normals, skin.scratch
     with_normals = normals.shape[0] > 0

@@ -89,8 +89,7 @@ def _angles_about_normals(edges: Float64, axes: Float64, starts: Int64) -> Float
     aside = np.cross(axes, reference)
     flat = np.cross(aside, axes)
     angle = np.arctan2((edges * aside).sum(axis=1), (edges * flat).sum(axis=1))
-    angles: Float64 = np.mod(angle, 2 * np.pi)
-    return angles
+    return np.asarray(np.mod(angle, 2 * np.pi))
 
 
 def _nearest_to_angle(angles: Float64, wanted: float, other: Int64, centre: Int64, starts: Int64) -> Int64:

@@ -1,4 +1,1 @@
-"""BAPs to joint matrices and back, the conventions of the angles, and the limits of human joints.
-
-May use: the skeleton, compiled loops.
-"""
+"""BAPs to joint matrices and back, the conventions of the angles, and the limits of human joints."""

@@ -9,16 +9,15 @@ standard's BAP table.
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64, Int32
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, bap_numbers, baps
+from fba.text_files import packaged_rows
 
 DEGREES = np.degrees(1e-5)
 """Degrees in one unit of a rotational BAP."""
@@ -147,10 +146,9 @@ def _excess(limit: JointLimit, array: Float64) -> tuple[Float64, Float64]:
 
 @cache
 def _human() -> tuple[JointLimit, ...]:
-    text = (files(__package__) / "limits.csv").read_text(encoding="utf-8")
     numbers = bap_numbers()
     result = []
-    for row in csv.DictReader(text.splitlines()):
+    for row in packaged_rows(__package__, "limits.csv"):
         low, high = float(row["low"]), float(row["high"])
         for side, word in (("l", "left "), ("r", "right ")) if row["right_side"] else (("", ""),):
             names = row["baps"].replace("?", side).split()

@@ -20,7 +20,7 @@ from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, baps
 from fba.tracks import BodyColumns, BodyTrack
 
 VALUE_LIMIT = 2**31 - 1
-BLOCK = 512
+SOLVED_AT_ONCE = 512
 """Frames of a track solved at once: joint matrices of a long capture would not fit into memory."""
 HALF_TURN = 314159
 """pi in 1e-5 rad."""
@@ -214,8 +214,8 @@ def solve_track(
     sent = np.zeros(BAP_COUNT, dtype=bool)
     sent[[bap.number - 1 for bap in baps() if bap.joint in joints]] = True
     rows = np.empty((count, int(sent.sum())), dtype=np.int32)  # every block is written below
-    for begin in range(0, count, BLOCK):
-        block = slice(begin, min(begin + BLOCK, count))
+    for begin in range(0, count, SOLVED_AT_ONCE):
+        block = slice(begin, min(begin + SOLVED_AT_ONCE, count))
         values = solver.solve(matrices(block), joints, previous)
         previous = values[-1]
         rows[block] = values[:, sent]
@@ -264,5 +264,4 @@ def _wrap(rows: Int32, columns: list[int], limit: int = HALF_TURN) -> None:
 def _full_turns(angle: float | Float64) -> Int64:
     """Return the whole turns in angles, in 1e-5 rad."""
     full = 2e5 * np.pi
-    turns: Int64 = np.rint(np.rint(np.asarray(angle) / full) * full).astype(np.int64)
-    return turns
+    return np.rint(np.rint(np.asarray(angle) / full) * full).astype(np.int64)

@@ -5,9 +5,8 @@ closest to the frame before is taken, so that a smooth motion has smooth angles.
 
 Bounds: `BapSolver.solve` checks the shape of matrices, and passes tables of its own joints: three axes of
 0..2 and as many columns, below 296, as a joint has freedoms, of which there are at most three; parents come
-first. It makes `values` with a row for each frame. Frames are taken in blocks of BLOCK, for which all else is
-made here. `joint_angles` makes all arrays that it does not get; angles have a column for each frame of
-`local`.
+first. It makes `values` with a row for each frame. For blocks of BLOCK_FRAMES, all else is made here.
+`joint_angles` makes all arrays that it does not get; angles have a column for each frame of `local`.
 """
 
 from __future__ import annotations
@@ -18,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Int64
-from fba.body.solve._fast_trig import arc_tangent, sine_cosine
-from fba.body.solve._pose_loops import UNIT
+from fba.body.solve._pose_loops import UNIT, arc_tangent, sine_cosine
 from fba.compiled import compiled, inlined
 
 NEAR_LOCK = 1e-5
@@ -30,9 +28,9 @@ ALMOST = 1e-4
 """Where that component is smaller than this, one step of the search is enough."""
 SETTLED = 1e-8
 """Radians: the search for two turns ends when a step changes them by less."""
-STEPS = 12
+MAX_SEARCH_STEPS = 12
 """Most steps of the search for two turns."""
-BLOCK = 16
+BLOCK_FRAMES = 16
 """Frames that are solved together, joint by joint."""
 TURN = 2.0 * math.pi
 
@@ -114,7 +112,7 @@ def _refine_two(m: Float64, f: int, a1: int, a2: int, start: Float64, work: Floa
     """Refine frame f of start (3, N), in place: turns about two axes closest to the rotations m (3, 3, N)."""
     x = float(start[0, f])
     y = float(start[1, f])
-    steps = STEPS if abs(m[a1, a2, f]) > ALMOST else 1
+    steps = MAX_SEARCH_STEPS if abs(m[a1, a2, f]) > ALMOST else 1
     for _ in range(steps):  # coordinate ascent: one turn, then the other
         for i in range(3):
             for k in range(3):
@@ -254,13 +252,13 @@ def solve(
     """
     axis, sign = joints.freedoms.axis, joints.freedoms.sign
     size = joints.parents.shape[0]
-    reached = np.zeros((size, 3, 3, BLOCK))  # frames innermost: vector code
-    local = np.zeros((3, 3, BLOCK))
-    angles = np.zeros((3, BLOCK))
-    sines = np.zeros(BLOCK)
-    cosines = np.zeros(BLOCK)
-    for begin in range(0, values.shape[0], BLOCK):
-        frames = min(BLOCK, values.shape[0] - begin)
+    reached = np.zeros((size, 3, 3, BLOCK_FRAMES))  # frames innermost: vector code
+    local = np.zeros((3, 3, BLOCK_FRAMES))
+    angles = np.zeros((3, BLOCK_FRAMES))
+    sines = np.zeros(BLOCK_FRAMES)
+    cosines = np.zeros(BLOCK_FRAMES)
+    for begin in range(0, values.shape[0], BLOCK_FRAMES):
+        frames = min(BLOCK_FRAMES, values.shape[0] - begin)
         for j in range(size):
             p = int(joints.parents[j])
             count = int(joints.freedoms.counts[j]) if wanted[j] else 0

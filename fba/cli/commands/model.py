@@ -350,10 +350,9 @@ def fit(
 
 
 def _read_points(path: Path, model: FaceModel) -> Float64:
-    """Return the feature points of a file; of an Xface file without its mesh, points with its distances."""
-    from fba.face.importers.points.fdp import read_fdp
+    """Return feature points of a file; for an Xface file without its mesh, those that its distances imply."""
+    from fba.face.importers.points.fdp import read_fdp, xface_points
     from fba.face.importers.points.points_file import read_points
-    from fba.face.importers.points.xface import xface_points
     from fba.text_files import find_beside
 
     if path.suffix.lower() in (".json", ".csv"):

@@ -13,26 +13,24 @@ from fba.arrays import Float64, Int32
 from fba.errors import ModelError
 from fba.face._expressions import Definitions
 from fba.face._tables import HEAD, FaceDefTables, FaceDefTransform
-from fba.face.authoring.regions._brows_cheeks_nose import brow_cheek_nose_motions
-from fba.face.authoring.regions._ears import ear_motions
 from fba.face.authoring.regions._eye_opening import LIDS, measure_opening
 from fba.face.authoring.regions._eyes import Eye, eye_transforms, find_eyes, pupil_motions
 from fba.face.authoring.regions._lids import lash_motion, lid_motion, sculpted_share
 from fba.face.authoring.regions._lips import HANDLES, lip_motions
-from fba.face.authoring.regions._tongue import FAPS as TONGUE_FAPS
-from fba.face.authoring.regions._tongue import tongue_motion
+from fba.face.authoring.regions._soft_skin import brow_cheek_nose_motions, ear_motions
 from fba.face.authoring.regions.jaw import (
     CHIN,
+    TONGUE_FAPS,
     Jaw,
     find_jaw,
     jaw_share_of_part,
     opening_angles,
     opening_shifts,
+    tongue_motion,
 )
 from fba.face.authoring.surface._fold_limits import Limiter
-from fba.face.authoring.surface._motion import Motion, build_tables, split_by_part
+from fba.face.authoring.surface._motion import Motion, build_tables, split_by_part, unfold
 from fba.face.authoring.surface._motion_limits import eased_linear_motion, stop_at_folds
-from fba.face.authoring.surface._unfold import unfold
 from fba.face.authoring.surface.attached_parts import ATTACHED_DISTANCE, MAX_ATTACHED_SIZE, Anchors, attach
 from fba.face.authoring.surface.binding import Binding, bind_points, face_size, separate_lips
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks, find_landmarks, weld_skin
@@ -101,9 +99,7 @@ def author(
         points=binding.points,
         bound=binding.bound,
         tables=tuple(
-            build_tables(
-                fap, marks.fapu[faps()[fap - 1].unit], work.moves.get(fap, {}), work.turns.get(fap, ())
-            )
+            build_tables(fap, marks.fapu.of_fap(fap), work.moves.get(fap, {}), work.turns.get(fap, ()))
             for fap in sorted({*work.moves, *work.turns})
         ),
         fit=fit,
@@ -115,8 +111,7 @@ def author(
 
 
 def author_lids(model: FaceModel, sculpted: Mapping[int, Sequence[Float64]]) -> dict[int, FaceDefTables]:
-    """Return the tables by FAP (19..22) of lids that move as shapes do; FAPs whose lid no shape moves are
-    left out.
+    """Return the tables by FAP (19..22) of lids that move as shapes do, without those that no shape moves.
 
     sculpted: by FAP, displacements (V, 3) of the model's vertices, metres: of several shapes, the first that
     moves the lid.
@@ -129,14 +124,12 @@ def author_lids(model: FaceModel, sculpted: Mapping[int, Sequence[Float64]]) -> 
         opening = measure_opening(work.marks, work.eyes[side])
         for shape in shapes if opening is not None else ():
             assert opening is not None
-            shift = np.zeros((len(surface), 3))
-            shift[surface.number] = shape[surface.pool]
+            shift = surface.of_all(shape)
             if sculpted_share(work.marks, opening, work.eyes[side], lid, shift) is not None:
                 work.add_lid(fap, shift)
                 break
         if fap in work.moves:
-            unit = model.fapu[faps()[fap - 1].unit]
-            made[fap] = build_tables(fap, unit, work.moves[fap])
+            made[fap] = build_tables(fap, model.fapu.of_fap(fap), work.moves[fap])
     return made
 
 

@@ -122,16 +122,13 @@ def _fit_rotation(here: Float64, there: Float64, *, reflected: bool = False) -> 
 
 
 def _robust_weights(errors: Float64, points: Float64) -> Float64:
-    """Return (N,) Geman-McClure weights of points (N, 3) by their errors (N,), near 1 below the median
-    error."""
+    """Return (N,) Geman-McClure weights of points (N, 3) by errors (N,), near 1 below the median error."""
     usual = max(1.5 * float(np.median(errors)), 1e-9 * float(np.abs(points).max()))
-    weights: Float64 = 1.0 / (1.0 + (errors / (2 * usual)) ** 2) ** 2
-    return weights
+    return 1.0 / (1.0 + (errors / (2 * usual)) ** 2) ** 2
 
 
 def _find_flat_pose(here: Float64, there: Float64) -> Float64:
-    """Return (3, 3) rotation of points in a plane onto the model seen from the front, the better side
-    forward."""
+    """Return (3, 3) rotation of points in a plane onto the model from the front, the better side forward."""
     axes, _ = principal_axes(here)
     axes[2] = np.cross(axes[0], axes[1])
     flat = (here - here.mean(axis=0)) @ axes.T
@@ -140,8 +137,7 @@ def _find_flat_pose(here: Float64, there: Float64) -> Float64:
         plane = flat * (1.0, side, 0.0)
         matrix, error = _fit_rotation(plane, there * (1.0, 1.0, 0.0))
         poses.append((error, matrix @ np.diag([1.0, side, side]) @ axes))
-    best: Float64 = min(poses, key=lambda pair: pair[0])[1]
-    return best
+    return min(poses, key=lambda pair: pair[0])[1]
 
 
 def _snap_to_axes(matrix: Float64) -> Float64:
@@ -191,8 +187,7 @@ def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
 
 
 def centre_on_pupils(points: Float64, reference: Float64) -> Float64:
-    """Return the points (84, 3) shifted so that the midpoint of the pupils is the reference's; unchanged if
-    unknown."""
+    """Return the points (84, 3), the middle of the pupils shifted to the reference's if both are known."""
     rows = [row_of()["3.5"], row_of()["3.6"]]
     shift = reference[rows].mean(axis=0) - points[rows].mean(axis=0)
     return points + shift if np.isfinite(shift).all() else points

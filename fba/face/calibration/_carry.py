@@ -140,8 +140,7 @@ def _carry_hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Fl
 
 
 def _point_correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Float64]) -> Float64 | None:
-    """Return (K, 3, 3) matrices that restore the motion per FAPU of the FAP's own point; None if no mesh has
-    it."""
+    """Return (K, 3, 3) matrices that restore the motion of the FAP's point, in FAPU; None without one."""
     for name in faps()[table.fap - 1].feature_points:
         vertex = int(model.bound[row_of()[name]])
         for mesh in table.meshes:
@@ -154,8 +153,7 @@ def _point_correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str
 
 
 def _rotation_and_scale(a: Float64, b: Float64) -> Float64:
-    """Return (3, 3) smallest rotation, with a scale, that takes a to b; the unit matrix where either is
-    zero."""
+    """Return (3, 3) smallest rotation and scale that take a to b; the unit matrix where either is zero."""
     lengths = float(np.linalg.norm(a)), float(np.linalg.norm(b))
     if min(lengths) < 1e-9:
         return np.eye(3)
@@ -164,8 +162,7 @@ def _rotation_and_scale(a: Float64, b: Float64) -> Float64:
 
 
 def surface_stretches(part: Part, after: Floating) -> Float64:
-    """Return (V, 3, 3) linear map that takes the surface around each vertex of a part to vertices `after` (V,
-    3).
+    """Return (V, 3, 3) linear maps of a part's surface around each vertex to vertices `after` (V, 3).
 
     Least squares over the edges at the vertex; its normal goes to the new normal, scaled as the surface is.
     """
@@ -189,8 +186,7 @@ def surface_stretches(part: Part, after: Floating) -> Float64:
     products += (weight * size)[:, None, None] * along[1][:, :, None] * along[0][:, None, :]
     squares += (MEAN_STRETCH_WEIGHT * weight)[:, None, None] * np.eye(3)
     products += (MEAN_STRETCH_WEIGHT * weight * size)[:, None, None] * np.eye(3)
-    matrices: Float64 = products @ np.linalg.inv(squares)
-    return matrices
+    return products @ np.linalg.inv(squares)
 
 
 def keep_lid_on_eyeball(
@@ -229,5 +225,4 @@ def keep_lid_on_eyeball(
 def _positions_at_borders(vertices: Float64, moves: Float64, steps: Float64, zero: int) -> Float64:
     """Return (N, K, 3) position of each vertex at each border."""
     path = np.concatenate([np.zeros((len(vertices), 1, 3)), moves * steps[:, None]], axis=1).cumsum(axis=1)
-    positions: Float64 = vertices[:, None] + path - path[:, [zero]]
-    return positions
+    return np.asarray(vertices[:, None] + path - path[:, [zero]])

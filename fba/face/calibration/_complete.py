@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from fba.arrays import Float64
-from fba.errors import FbaWarning
-from fba.face.feature_points import MIRRORED, names, row_of
+from fba.errors import warn
+from fba.face.feature_points import FREE_POINTS, MATES, MIRRORED, names, row_of
 
 MIN_DISTANCE = 0.012
 """Points further apart on the face than this share of the pupils' distance must not coincide."""
@@ -30,8 +28,6 @@ MAX_LIP_GAP = 0.01
 TOLERATED_GAP = 0.25
 """Lips stay unchanged if they are off by less than this share of the distance between two such points."""
 TEETH = ("9.10", "9.11")
-FREE_POINTS = ("7.1", "11.5")
-"""Points on no surface: they do not describe its shape, and authors place them differently."""
 
 _MEET = (
     *({upper, lower} for upper, lower, _ in LIPS),
@@ -39,7 +35,6 @@ _MEET = (
     *({"3.5", "3.1"}, {"3.5", "3.3"}, {"3.6", "3.2"}, {"3.6", "3.4"}),
 )
 """Pairs that may coincide, or that `shut_mouth` and `centre_pupils` separate."""
-_OTHER = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 
 
 def drop_mistakes(points: Float64, expected: Float64) -> Float64:
@@ -80,7 +75,7 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
     for row in rows:
         if np.isnan(result[row, 0]) or names()[row] in FREE_POINTS or not away[row] > limit:
             continue
-        other = _OTHER.get(names()[row])
+        other = MATES.get(names()[row])
         mate = shift[row_of()[other]] * (-1.0, 1.0, 1.0) if other else np.full(3, np.nan)
         if not np.linalg.norm(mate - shift[row]) < 0.5 * away[row]:
             result[row] = np.nan
@@ -88,7 +83,7 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
                 f"{names()[row]} is {away[row] * 1000:.0f} mm from its position by the other points: left out"
             )
     if messages:
-        _warn("; ".join(messages))
+        warn("; ".join(messages), stacklevel=3)
     return result
 
 
@@ -96,7 +91,7 @@ def _asymmetry(points: Float64) -> Float64:
     """Return the distance of each point from the mirror image of its mate, metres (84,); 0 without a mate."""
     image = _mirror_image(points)
     apart = np.zeros(len(points))
-    for name, other in _OTHER.items():
+    for name, other in MATES.items():
         apart[row_of()[name]] = np.linalg.norm(points[row_of()[name]] - image[row_of()[other]])
     return np.nan_to_num(apart)
 
@@ -106,7 +101,7 @@ def mirror_missing(points: Float64) -> tuple[Float64, tuple[str, ...]]:
     image = _mirror_image(points)
     full = points.copy()
     added = []
-    for name, other in _OTHER.items():
+    for name, other in MATES.items():
         row, source = row_of()[name], row_of()[other]
         if np.isnan(points[row]).any() and np.isfinite(points[source]).all():
             full[row] = image[source]
@@ -117,15 +112,11 @@ def mirror_missing(points: Float64) -> tuple[Float64, tuple[str, ...]]:
 def _mirror_image(points: Float64) -> Float64:
     """Return points (84, 3) reflected in the plane between left and right."""
     normal, offset = _symmetry_plane(points)
-    image: Float64 = points - 2 * np.outer(points @ normal - offset, normal)
-    return image
+    return points - 2 * np.outer(points @ normal - offset, normal)
 
 
 def _symmetry_plane(points: Float64) -> tuple[Float64, float]:
-    """Return unit normal and offset of the plane between left and right, normal . x = offset.
-
-    The pairs and midline points that are given determine it; where they do not, the normal is +x.
-    """
+    """Return normal and offset of the plane between left and right, by the points given; else +x."""
     rows = np.array([(row_of()[left], row_of()[right]) for left, right in MIRRORED.items()])
     known = np.isfinite(points[rows]).all(axis=(1, 2))
     left, right = points[rows[known, 0]], points[rows[known, 1]]
@@ -135,7 +126,7 @@ def _symmetry_plane(points: Float64) -> tuple[Float64, float]:
         length = float(np.linalg.norm(across))
         if length > 0 and across[0] / length > np.cos(MAX_TILT):
             normal = across / length
-    middle = [row_of()[name] for name in names() if name not in _OTHER]
+    middle = [row_of()[name] for name in names() if name not in MATES]
     halves = np.vstack([(left + right) / 2, points[middle][np.isfinite(points[middle]).all(axis=1)]])
     return normal, float(np.median(halves @ normal)) if len(halves) else 0.0
 
@@ -154,19 +145,16 @@ def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
         if abs(off) > MAX_PUPIL_OFFSET * (top - bottom) > 0:
             full[row_of()[pupil], 1] -= off
             moved.append((pupil, off))
-    if moved:
-        _warn(
-            "; ".join(
-                f"pupil {name} is {off * 1000:+.1f} mm off the middle between the lids: moved there"
-                for name, off in moved
-            )
-        )
+    texts = [
+        f"pupil {p} is {off * 1000:+.1f} mm off the middle between the lids: moved there" for p, off in moved
+    ]
+    if texts:
+        warn("; ".join(texts), stacklevel=3)
     return full, tuple(name for name, _ in moved)
 
 
 def shut_mouth(points: Float64, reference: Float64) -> Float64:
-    """Return the points (84, 3) with lips and teeth that meet as those of the reference do; the upper ones
-    stay.
+    """Return the points (84, 3), lips and teeth meeting as the reference's do; the upper ones stay.
 
     reference: (84, 3), the model's points at the person's size. If the person's mouth is open, the whole
     lower lip is raised, and an FbaWarning says how far.
@@ -193,17 +181,19 @@ def shut_mouth(points: Float64, reference: Float64) -> Float64:
             full[b] = full[a] + apart
     if abs(widest) > MAX_LIP_GAP * width:
         fault = "the mouth is open by" if widest > 0 else "the lower lip is in the upper one by"
-        _warn(
+        warn(
             f"{fault} {abs(widest) * 1000:.1f} mm, but the lips of a neutral face touch: "
-            "the lower lip was moved"
+            "the lower lip was moved",
+            stacklevel=3,
         )
     a, b = (row_of()[name] for name in TEETH)
     apart = full[a] + reference[b] - reference[a] - full[b]
     if np.isfinite(apart).all():
         if np.linalg.norm(apart) > 2 * MAX_LIP_GAP * width:
-            _warn(
+            warn(
                 f"upper and lower teeth are {np.linalg.norm(apart) * 1000:.1f} mm from touching as those "
-                "of a neutral face do: the lower ones were moved"
+                "of a neutral face do: the lower ones were moved",
+                stacklevel=3,
             )
         full[[b, row_of()["9.9"]]] += apart
     return full
@@ -213,7 +203,3 @@ def _between(points: Float64, left: str, right: str) -> float:
     """Return the distance of two points in x, metres; 0.06 where it is unknown or not positive."""
     distance = float(points[row_of()[left], 0] - points[row_of()[right], 0])
     return distance if np.isfinite(distance) and distance > 0 else 0.06
-
-
-def _warn(text: str) -> None:
-    warnings.warn(text, FbaWarning, stacklevel=4)

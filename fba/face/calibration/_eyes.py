@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fba.arrays import Bool, Float64, Floating
 from fba.easing import smoothstep
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.face.calibration._field import linear_field
 from fba.face.eyeball import Eyeball
 
@@ -55,8 +54,7 @@ class FittedEye:
         across = np.hypot(unit[:, 0], unit[:, 1])
         around = unit[:, :2] / np.maximum(across, 1e-12)[:, None]
         moved = np.column_stack([around * np.sin(polar)[:, None], np.cos(polar)])
-        scaled: Float64 = self.centre + moved * (distance * self.radius / self.was.radius)[:, None]
-        return scaled
+        return np.asarray(self.centre + moved * (distance * self.radius / self.was.radius)[:, None])
 
     @property
     def size(self) -> float:
@@ -125,16 +123,14 @@ def fit_eye(
 
 
 def _setback(given: Float64, least: Float64, centre: Float64, side: str) -> float:
-    """Return the metres by which an eyeball must be set back for points (K, 3) to be at least (K,) from its
-    centre."""
+    """Return the metres to set an eyeball back so that points (K, 3) are at least (K,) from its centre."""
     across = np.hypot(*(given - centre)[:, :2].T)
     room = np.sqrt(np.maximum(least**2 - across**2, 0.0))
     back = float(np.where(room > 0, centre[2] + room - given[:, 2], 0.0).max(initial=0.0))
     if back > MAX_SILENT_SETBACK:
-        warnings.warn(
+        warn(
             f"the lids of the {side} eye lie {back * 1000:.1f} mm inside its eyeball: "
             "the eyeball and its pupil were set back",
-            FbaWarning,
             stacklevel=6,
         )
     return back
@@ -167,15 +163,15 @@ def _lay_on(eye: FittedEye, skin: Float64, fitted: Float64) -> Float64:
     distance = np.linalg.norm(skin - eye.was.centre, axis=1)
     arms = fitted - eye.centre
     length = np.maximum(np.linalg.norm(arms, axis=1), 1e-12)
-    laid: Float64 = fitted + arms * (eyeball_weight(eye, skin) * (distance * eye.size / length - 1))[:, None]
-    return laid
+    return np.asarray(
+        fitted + arms * (eyeball_weight(eye, skin) * (distance * eye.size / length - 1))[:, None]
+    )
 
 
 def eyeball_weight(eye: FittedEye, points: Float64) -> Float64:
     """Return (N,) influence of the eyeball on points (N, 3): 1 on it, 0 beyond `REACH`."""
     distance = np.linalg.norm(points - eye.was.centre, axis=1)
-    weight: Float64 = 1 - smoothstep((distance / eye.was.radius - LID_RADII) / (REACH - LID_RADII))
-    return weight
+    return 1 - smoothstep((distance / eye.was.radius - LID_RADII) / (REACH - LID_RADII))
 
 
 def _push_outside(eye: FittedEye, skin: Float64, moved: Float64, near: Bool, sources: Float64) -> Float64:

@@ -31,10 +31,7 @@ KERNELS = ("thin_plate_spline", "cubic", "linear")
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A deformation of space: calling it with points (N, 3) gives where they move, metres.
-
-    matrix, origin, target: its affine part. rest: the non-affine part, a function of points (N, 3).
-    """
+    """A deformation of points (N, 3), metres: an affine part, and `rest`, a function of points."""
 
     matrix: Float64
     origin: Float64
@@ -43,8 +40,7 @@ class Field:
 
     def __call__(self, points: Floating) -> Float64:
         flat = np.asarray(points, dtype=np.float64)
-        moved: Float64 = (flat - self.origin) @ self.matrix.T + self.target + self.rest(flat)
-        return moved
+        return np.asarray((flat - self.origin) @ self.matrix.T + self.target + self.rest(flat))
 
     def rotations(self, points: Floating) -> Float64:
         """Return (N, 3, 3) rotation of the deformation at each point, without its stretch."""
@@ -82,8 +78,7 @@ def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str,
 
 
 def anchors_far_from(mesh: Float64, sources: Float64) -> Float64:
-    """Return (K, 3): up to `ANCHORS` vertices, spread over that part of a mesh that is far from all
-    sources."""
+    """Return (K, 3): up to `ANCHORS` vertices, spread over the part of a mesh far from all sources."""
     from scipy.spatial import cKDTree
 
     away = cKDTree(sources).query(mesh)[0]
@@ -100,8 +95,7 @@ def anchors_far_from(mesh: Float64, sources: Float64) -> Float64:
 
 
 def bump_field(centres: Float64, shifts: Float64, width: float) -> Any:
-    """Return a function from points (N, 3) to shifts: exact at the centres, fading within about `width`
-    metres."""
+    """Return a function from points (N, 3) to shifts: exact at the centres, fading within `width` metres."""
     centres, shifts = _merge_coincident(centres, shifts)
     gram = np.exp(-_squares(centres, centres) / (2 * width**2))
     strength = np.linalg.lstsq(gram, shifts, rcond=None)[0]
@@ -119,13 +113,11 @@ def linear_field(centres: Float64, shifts: Float64) -> Any:
 
 def _squares(a: Float64, b: Float64) -> Float64:
     """Return (N, M) squared distances between points (N, 3) and (M, 3)."""
-    squares: Float64 = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
-    return squares
+    return np.asarray(((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2))
 
 
 def _merge_coincident(sources: Float64, targets: Float64) -> tuple[Float64, Float64]:
-    """Return the sources and targets (K, 3), coinciding sources (as of touching lips) merged, their targets
-    averaged."""
+    """Return sources and targets (K, 3), coinciding sources (touching lips) merged, targets averaged."""
     from scipy.spatial import cKDTree
 
     group = np.arange(len(sources))
@@ -139,8 +131,7 @@ def _merge_coincident(sources: Float64, targets: Float64) -> tuple[Float64, Floa
 
 
 def folded_vertices(field: Field, mesh: Floating, size: float) -> Intp:
-    """Return the vertices at which the deformation turns space inside out, or nearly so. size: its usual
-    scale."""
+    """Return the vertices where the deformation turns space nearly inside out. size: its usual scale."""
     volume = np.linalg.det(field.jacobians(mesh)) / size**3
     return np.flatnonzero(~(volume > LEAST_VOLUME))
 
@@ -163,8 +154,7 @@ def turned_over_triangles(before: Floating, after: Float64, triangles: Integer) 
 
 
 def nearest_points(points: Float64, sources: Float64, rows: Intp) -> tuple[str, ...]:
-    """Return the names of the four feature points (rows, at sources (N, 3)) that are nearest to most of the
-    points."""
+    """Return the names of the four feature points (rows, at sources (N, 3)) nearest to most points."""
     from scipy.spatial import cKDTree
 
     if not len(points) or not len(sources):

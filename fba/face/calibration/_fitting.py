@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from operator import itemgetter
@@ -12,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Bool, Float64, Intp
-from fba.errors import FbaWarning, ModelError
+from fba.errors import ModelError, warn
 from fba.face.calibration._align import Alignment, align, centre_on_pupils, known_rows
 from fba.face.calibration._complete import centre_pupils, drop_mistakes, mirror_missing, shut_mouth
 from fba.face.calibration._field import (
@@ -68,10 +67,9 @@ def fit(
     given = _check_points(points)
     aligned = align(given, model.points, unit=unit)
     if aligned.mirrored:
-        warnings.warn(
+        warn(
             "the feature points are those of a mirrored face: +x must be the subject's left; "
             "left and right were swapped",
-            FbaWarning,
             stacklevel=2,
         )
     plausible = drop_mistakes(_swap_to_own_sides(aligned.points), aligned.expected)
@@ -145,19 +143,18 @@ def _check_points(points: npt.ArrayLike) -> Float64:
 
 
 def _swap_to_own_sides(points: Float64) -> Float64:
-    from fba.face.importers.points._fdp_data import repair_sides
+    from fba.face.importers.points.fdp import repair_sides
 
     repaired, swaps, wrong = repair_sides(points)
     changes = [f"{a} and {b} have changed places" for a, b in swaps]
     changes += [f"{name} is on the other side" for name in wrong]
     if changes:
-        warnings.warn(f"corrected: {'; '.join(changes)}", FbaWarning, stacklevel=3)
+        warn(f"corrected: {'; '.join(changes)}", stacklevel=3)
     return repaired
 
 
 def _size(here: Float64, there: Float64) -> float:
-    """Return the person's size relative to the model: the median over all pairs of points, so robust to
-    outliers."""
+    """Return the person's size relative to the model: the median over all pairs of points."""
     from scipy.spatial.distance import pdist
 
     before, after = pdist(here), pdist(there)
@@ -185,10 +182,7 @@ def _iris_diameters(model: FaceModel, targets: Float64, size: float) -> tuple[fl
 def _deform_without_folds(
     model: FaceModel, targets: Float64, known: Bool, sure: Bool, size: float, iris: tuple[float, float]
 ) -> Shape:
-    """Return the shape by the smoothest deformation that does not fold.
-
-    Raises ModelError, naming the points, where every kernel folds.
-    """
+    """Return the shape by the smoothest deformation without folds. ModelError where every kernel folds."""
     outer = known & np.array([name not in INNER for name in names()])
     pupils = [row_of()["3.5"], row_of()["3.6"]]
     if outer.sum() < 4:
@@ -276,10 +270,9 @@ def _author_anew(model: FaceModel, fitted: FaceModel) -> FaceModel:
 
 
 def _count_errors(poser: Poser, fap: int | None = None) -> int:
-    from fba.face.checks._fap_checks import check_posed
+    from fba.face.checks._fap_checks import count_errors
 
-    findings = check_posed(poser, range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1) if fap is None else [fap])
-    return sum(finding.severity == "error" for finding in findings)
+    return count_errors(poser, range(FIRST_LOW_LEVEL_FAP, FAP_COUNT + 1) if fap is None else [fap])
 
 
 def _fit_note(aligned: Alignment, known: Bool, added: tuple[str, ...]) -> str:

@@ -13,7 +13,7 @@ from fba.face.calibration._align import known_rows
 from fba.face.calibration._eyes import REACH, FittedEye, fit_eye, lay_lids_on
 from fba.face.calibration._field import Field, bump_field
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import FREE_POINTS, names, row_of
 from fba.geometry import Similarity, fit_similarity
 from fba.mesh import vertex_normals
 from fba.rotations import apply, between_all
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 TEETH = {"upper": ("9.10", "9.8"), "lower": ("9.11", "9.9")}
 """Points of each jaw: the edge of the teeth first, then the gums."""
 TONGUE = ("6.1", "6.2", "6.3", "6.4")
-INNER = ("3.5", "3.6", *TEETH["upper"], *TEETH["lower"], *TONGUE, "7.1", "11.5")
+INNER = ("3.5", "3.6", *TEETH["upper"], *TEETH["lower"], *TONGUE, *FREE_POINTS)
 """Points on rigid parts, inside the mouth or on no surface: they do not deform the skin."""
 ON_LIDS = ("lash", "brow", "hair", "other")
 """Kinds of parts that move with the skin under them."""
@@ -185,8 +185,7 @@ def _foremost_z(points: Float64, point: Float64) -> float:
 
 
 def _fit_tongue(base: Similarity, here: Float64, there: Float64) -> Map:
-    """Return the map of the tongue, which moves as the lower teeth (`base`), and takes given points to
-    others."""
+    """Return the map of the tongue: as the lower teeth (`base`), but given points go to their targets."""
     if not len(here):
         return base.apply
     rest = bump_field(here, there - base.apply(here), TONGUE_WIDTH)
@@ -215,8 +214,7 @@ def _lid_shift_at(
     distance, nearest = cKDTree(skin[near]).query(vertices, k=4)
     weight = 1.0 / np.maximum(distance, 1e-6)
     weight /= weight.sum(axis=1, keepdims=True)
-    mean: Float64 = (shift[near][nearest] * weight[..., None]).sum(axis=1)
-    return mean
+    return np.asarray((shift[near][nearest] * weight[..., None]).sum(axis=1))
 
 
 def _points(
@@ -235,7 +233,7 @@ def _points(
     for name in TONGUE:
         points[row_of()[name]] = tongue(model.points[row_of()[name]][None])[0]
     known = known_rows(targets)
-    free = [row_of()[name] for name in ("7.1", "11.5")]
+    free = [row_of()[name] for name in FREE_POINTS]
     points[free] = np.where(known[free, None], targets[free], points[free])
     joined = np.concatenate([vertices[part.name].astype(np.float32) for part in model.parts])
     bound = model.bound >= 0
@@ -247,8 +245,7 @@ def _points(
 
 
 def rebuild_part(part: Part, vertices: Float64) -> Part:
-    """Return the part with other vertices, its normals rotated with the surface so that seams stay
-    invisible."""
+    """Return the part with other vertices, its normals turned with the surface to keep seams invisible."""
     before, after = (
         vertex_normals(corners, part.triangles).astype(np.float64) for corners in (part.vertices, vertices)
     )

@@ -65,12 +65,9 @@ def _check_shift(poser: Poser, fap: int) -> Iterator[Finding]:
         wanted = value * poser.model.fapu[entry.unit] * direction
         off = np.array([(moved - wanted) @ direction, moved[0]]) if fap in ARC else moved - wanted
         if not np.linalg.norm(off) <= ACCURACY * np.linalg.norm(wanted):
-            yield Finding(
-                entry.label,
-                f"{point} moves by value x {entry.unit} {entry.positive}",
-                f"{_vector(moved * 1000)} mm at {value:g}",
-                f"{_vector(wanted * 1000)} mm within {ACCURACY:.0%}",
-            )
+            rule = f"{point} moves by value x {entry.unit} {entry.positive}"
+            found = f"{_vector(moved * 1000)} mm at {value:g}"
+            yield Finding(entry.label, rule, found, f"{_vector(wanted * 1000)} mm within {ACCURACY:.0%}")
     mate = entry.left_right_mate
     if mate is None:
         return
@@ -80,12 +77,8 @@ def _check_shift(poser: Poser, fap: int) -> Iterator[Finding]:
         share = float(np.linalg.norm(moved[poser.vertex(other)]))
         share /= max(float(np.linalg.norm(moved[poser.vertex(point)])), 1e-12)
         if share > MATE_TOLERANCE:
-            yield Finding(
-                entry.label,
-                f"{other}, the mate, stays",
-                f"{share:.1%} of the way of {point}",
-                f"under {MATE_TOLERANCE:.0%}",
-            )
+            found, expected = f"{share:.1%} of the way of {point}", f"under {MATE_TOLERANCE:.0%}"
+            yield Finding(entry.label, f"{other}, the mate, stays", found, expected)
 
 
 def _check_head(poser: Poser, fap: int) -> Iterator[Finding]:
@@ -94,23 +87,14 @@ def _check_head(poser: Poser, fap: int) -> Iterator[Finding]:
     total = np.sum([t.amount for t in turns], axis=0) if turns else np.zeros(3)
     axis = np.array(HEAD_AXIS[fap])
     if np.linalg.norm(total - axis) > ACCURACY:
-        yield Finding(
-            entry.label,
-            f"the head turns {entry.positive} by value x 1e-5 rad",
-            f"axis times rate {_vector(total)}",
-            _vector(axis),
-        )
+        found, expected = f"axis times rate {_vector(total)}", _vector(axis)
+        yield Finding(entry.label, f"the head turns {entry.positive} by value x 1e-5 rad", found, expected)
     centre = poser.point("7.1")
     for turn in turns:
         away = np.linalg.norm(np.array(turn.centre) - centre)
         if np.isfinite(away) and away > 1e-3:
-            yield Finding(
-                entry.label,
-                "the head turns about 7.1",
-                f"{away * 1000:.1f} mm away",
-                "at most 1 mm",
-                "warning",
-            )
+            found, expected = f"{away * 1000:.1f} mm away", "at most 1 mm"
+            yield Finding(entry.label, "the head turns about 7.1", found, expected, "warning")
 
 
 def _check_gaze(poser: Poser, fap: int) -> Iterator[Finding]:
@@ -125,12 +109,9 @@ def _check_gaze(poser: Poser, fap: int) -> Iterator[Finding]:
         wanted = np.zeros(3)
         wanted[axis] = value * poser.model.fapu.AU
         if np.linalg.norm(turn - wanted) > ACCURACY * np.linalg.norm(wanted):
-            yield Finding(
-                entry.label,
-                f"the eyeball turns {entry.positive} about its centre",
-                f"{_vector(np.degrees(turn))} degrees at {value:g}",
-                f"{_vector(np.degrees(wanted))} degrees",
-            )
+            rule = f"the eyeball turns {entry.positive} about its centre"
+            found = f"{_vector(np.degrees(turn))} degrees at {value:g}"
+            yield Finding(entry.label, rule, found, f"{_vector(np.degrees(wanted))} degrees")
     other = _eye_vertices(poser, "right" if side == "left" else "left")
     if len(other) and np.abs(poser.shift({fap: SMALL_ANGLE})[other]).max() > 1e-6:
         yield Finding(entry.label, "the other eyeball stays", "it moves", "no motion")
@@ -159,12 +140,9 @@ def _check_pupil(poser: Poser, fap: int) -> Iterator[Finding]:
         )
         if not len(rim) or np.abs(grown - wanted).max() > 0.15 * abs(value * unit / 2):
             measured = f"{float(np.mean(grown)) * 2000:.2f} mm" if len(rim) else "no vertices there"
-            yield Finding(
-                entry.label,
-                "the pupil's diameter grows by value x IRISD",
-                f"{measured} at {value:g}",
-                f"{float(np.mean(wanted)) * 2000 if len(rim) else value * unit * 1000:.2f} mm",
-            )
+            found = f"{measured} at {value:g}"
+            expected = f"{float(np.mean(wanted)) * 2000 if len(rim) else value * unit * 1000:.2f} mm"
+            yield Finding(entry.label, "the pupil's diameter grows by value x IRISD", found, expected)
 
 
 def _check_roll(poser: Poser, fap: int) -> Iterator[Finding]:
@@ -180,12 +158,9 @@ def _check_roll(poser: Poser, fap: int) -> Iterator[Finding]:
         turn = (turn + np.pi) % (2 * np.pi) - np.pi
         wanted = SMALL_ANGLE * poser.model.fapu.AU
         if abs(turn - wanted) > 2 * ACCURACY * wanted:
-            yield Finding(
-                entry.label,
-                f"{name} turns up about the tongue's middle",
-                f"{np.degrees(turn):.2f} degrees at {SMALL_ANGLE:g}",
-                f"{np.degrees(wanted):.2f} degrees",
-            )
+            found = f"{np.degrees(turn):.2f} degrees at {SMALL_ANGLE:g}"
+            expected = f"{np.degrees(wanted):.2f} degrees"
+            yield Finding(entry.label, f"{name} turns up about the tongue's middle", found, expected)
 
 
 def _eye_vertices(poser: Poser, side: str) -> Intp:
@@ -202,8 +177,7 @@ def _rotation(before: Float64, after: Float64) -> Float64:
 
     if len(before) < 3:
         return np.full(3, np.nan)
-    vector: Float64 = Rotation.align_vectors(after, before)[0].as_rotvec()
-    return vector
+    return np.asarray(Rotation.align_vectors(after, before)[0].as_rotvec())
 
 
 def _vector(numbers: Float64) -> str:

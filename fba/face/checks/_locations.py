@@ -8,11 +8,9 @@ deviations beyond the outermost mean, rounded outwards.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Literal
 
 import numpy as np
@@ -20,6 +18,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.face.checks._findings import Finding
 from fba.face.feature_points import MIRRORED, row_of
+from fba.text_files import packaged_rows
 
 AXES = {"x": 0, "y": 1, "z": 2}
 _DIRECTIONS = {"x": ("left of", "right of"), "y": ("above", "below"), "z": ("before", "behind")}
@@ -39,8 +38,7 @@ class Rule:
     sign: float = 1.0
 
     def violation(self, points: Float64, unit: float) -> tuple[str, str] | None:
-        """Return the texts (found, expected) where points (84, 3) break the rule, else None, as for unknown
-        points."""
+        """Return the texts (found, expected) where points (84, 3) break the rule; None if not, or unknown."""
         others = [name for name in (self.first, self.second) if name]
         column = AXES[self.axis]
         value, *limits = (float(points[row_of()[name], column]) for name in (self.point, *others))
@@ -69,18 +67,15 @@ class Rule:
 def rules() -> tuple[Rule, ...]:
     """Return every rule of `locations.csv`, and the mirror image of those for one side."""
     result = []
-    with (files(__package__) / "locations.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            severity: Literal["error", "warning"] = "error" if row["severity"] == "error" else "warning"
-            names = [row["point"], row["first"], row["second"]]
-            mirrored = [MIRRORED.get(name, name) for name in names]
-            for (point, first, second), sign in ((names, 1.0), (mirrored, -1.0)):
-                if sign > 0 or mirrored != names:
-                    side = sign if row["axis"] == "x" else 1.0
-                    rule = row["rule"]
-                    result.append(
-                        Rule(point, row["axis"], rule, first, second, float(row["share"]), severity, side)
-                    )
+    for row in packaged_rows(__package__, "locations.csv"):
+        severity: Literal["error", "warning"] = "error" if row["severity"] == "error" else "warning"
+        names = [row["point"], row["first"], row["second"]]
+        mirrored = [MIRRORED.get(name, name) for name in names]
+        share = float(row["share"])
+        for (point, first, second), sign in ((names, 1.0), (mirrored, -1.0)):
+            if sign > 0 or mirrored != names:
+                side = sign if row["axis"] == "x" else 1.0
+                result.append(Rule(point, row["axis"], row["rule"], first, second, share, severity, side))
     return tuple(result)
 
 
@@ -90,13 +85,9 @@ def check_locations(points: Float64) -> Iterator[Finding]:
     for left, right in MIRRORED.items():
         pair = points[[row_of()[left], row_of()[right]], 0]
         if np.isfinite(pair).all() and pair[0] <= pair[1]:
-            yield Finding(
-                f"{left} and {right}",
-                "left and right",
-                f"x {_mm(pair[0])} and {_mm(pair[1])}",
-                f"{left} on the subject's left: x greater than that of {right}",
-                "error",
-            )
+            found = f"x {_mm(pair[0])} and {_mm(pair[1])}"
+            expected = f"{left} on the subject's left: x greater than that of {right}"
+            yield Finding(f"{left} and {right}", "left and right", found, expected, "error")
     for rule in rules():
         broken = rule.violation(points, unit)
         if broken is not None:
@@ -119,8 +110,7 @@ class Size:
 @cache
 def human_sizes() -> tuple[Size, ...]:
     """Return every size of `human.csv`."""
-    with (files(__package__) / "human.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = packaged_rows(__package__, "human.csv")
     return tuple(Size(low=float(row.pop("low")), high=float(row.pop("high")), **row) for row in rows)
 
 
@@ -130,13 +120,9 @@ def check_sizes(points: Float64) -> Iterator[Finding]:
         ends = points[[row_of()[size.first], row_of()[size.second]], AXES[size.axis]]
         millimetres = abs(float(ends[0] - ends[1])) * 1000
         if np.isfinite(millimetres) and not size.low <= millimetres <= size.high:
-            yield Finding(
-                size.measure,
-                "size of a human face",
-                f"{millimetres:.1f} mm ({size.first} to {size.second}: {size.what})",
-                f"{size.low:g} to {size.high:g} mm",
-                "warning",
-            )
+            found = f"{millimetres:.1f} mm ({size.first} to {size.second}: {size.what})"
+            expected = f"{size.low:g} to {size.high:g} mm"
+            yield Finding(size.measure, "size of a human face", found, expected, "warning")
 
 
 def _mm(metres: float) -> str:

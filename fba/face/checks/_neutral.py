@@ -47,8 +47,7 @@ MAX_ASYMMETRY = 0.04
 
 
 def check_neutral(model: FaceModel) -> list[Finding]:
-    """Return the deviations of the model's rest position from the standard's neutral face; [] without
-    deviations.
+    """Return the deviations of the model's rest position from the standard's neutral face.
 
     "error" where FAPs would play wrongly, "warning" where it merely looks odd or cannot be checked.
     """
@@ -67,13 +66,10 @@ def check_neutral(model: FaceModel) -> list[Finding]:
 def _check_missing(model: FaceModel) -> Iterator[Finding]:
     if model.missing:
         count = len(model.missing)
-        yield Finding(
-            f"{count} feature point{'s' if count > 1 else ''}",
-            "present",
-            f"no {', '.join(model.missing)}",
-            "all 84: what depends on these is not checked",
-            "warning",
-        )
+        rule = "present"
+        found = f"no {', '.join(model.missing)}"
+        expected = "all 84: what depends on these is not checked"
+        yield Finding(f"{count} feature point{'s' if count > 1 else ''}", rule, found, expected, "warning")
 
 
 def _check_eyes(model: FaceModel) -> Iterator[Finding]:
@@ -90,13 +86,8 @@ def _check_eyes(model: FaceModel) -> Iterator[Finding]:
 def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
     subject = f"{eye.side} eye"
     if eye.error > MAX_ROUNDNESS_ERROR * eye.radius:
-        yield Finding(
-            subject,
-            "eyeball is a sphere",
-            f"{_mm(eye.error)} off it on average",
-            f"at most {_mm(MAX_ROUNDNESS_ERROR * eye.radius)}",
-            "warning",
-        )
+        rule, found = "eyeball is a sphere", f"{_mm(eye.error)} off it on average"
+        yield Finding(subject, rule, found, f"at most {_mm(MAX_ROUNDNESS_ERROR * eye.radius)}", "warning")
     direction = gaze(model, eye)
     if direction is not None:
         angle = float(np.degrees(np.arccos(np.clip(direction[2], -1.0, 1.0))))
@@ -105,23 +96,15 @@ def _check_eye(model: FaceModel, eye: Eyeball) -> Iterator[Finding]:
     iris = model.fapu.IRISD * PER_DISTANCE
     share = iris / (2 * eye.radius)
     if not IRIS_OF_EYEBALL[0] <= share <= IRIS_OF_EYEBALL[1]:
-        yield Finding(
-            subject,
-            "iris fits the eyeball",
-            f"iris {_mm(iris)} on an eyeball of {_mm(2 * eye.radius)}, {share:.2f} of it",
-            f"{IRIS_OF_EYEBALL[0]:g} to {IRIS_OF_EYEBALL[1]:g} of it",
-            "warning",
-        )
+        found = f"iris {_mm(iris)} on an eyeball of {_mm(2 * eye.radius)}, {share:.2f} of it"
+        expected = f"{IRIS_OF_EYEBALL[0]:g} to {IRIS_OF_EYEBALL[1]:g} of it"
+        yield Finding(subject, "iris fits the eyeball", found, expected, "warning")
     pupil = pupil_diameter(model, eye)
     if pupil is not None:
-        yield from _judge(
-            abs(pupil / (iris / 3) - 1),
-            PUPIL,
-            subject,
-            "pupil a third of the iris",
-            f"{_mm(pupil)}, {pupil / iris:.2f} of it",
-            f"{_mm(iris / 3)} +- {100 * PUPIL[0]:.0f} %",
-        )
+        rule = "pupil a third of the iris"
+        found = f"{_mm(pupil)}, {pupil / iris:.2f} of it"
+        expected = f"{_mm(iris / 3)} +- {100 * PUPIL[0]:.0f} %"
+        yield from _judge(abs(pupil / (iris / 3) - 1), PUPIL, subject, rule, found, expected)
 
 
 def _check_lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator[Finding]:
@@ -130,14 +113,10 @@ def _check_lids(model: FaceModel, side: str, upper: str, lower: str) -> Iterator
     pupil = _point(model, PUPIL_POINT[side])
     for name, edge in ((upper, 0.5 * iris), (lower, -0.5 * iris)):
         height = float(_point(model, name)[1] - pupil[1])
-        yield from _judge(
-            abs(height - edge) / iris,
-            TANGENT,
-            f"feature point {name}",
-            "lid tangent to the iris",
-            f"{_mm(height)} above the pupil" if edge > 0 else f"{_mm(-height)} below the pupil",
-            f"{_mm(abs(edge))} +- {_mm(TANGENT[0] * iris)}, half of the iris",
-        )
+        rule = "lid tangent to the iris"
+        found = f"{_mm(height)} above the pupil" if edge > 0 else f"{_mm(-height)} below the pupil"
+        expected = f"{_mm(abs(edge))} +- {_mm(TANGENT[0] * iris)}, half of the iris"
+        yield from _judge(abs(height - edge) / iris, TANGENT, f"feature point {name}", rule, found, expected)
 
 
 def _check_lips(model: FaceModel) -> Iterator[Finding]:
@@ -147,14 +126,10 @@ def _check_lips(model: FaceModel) -> Iterator[Finding]:
     middle = float(np.mean([_point(model, name)[1] for name in ("2.2", "2.3")]))
     for name in ("2.4", "2.5"):
         off = float(_point(model, name)[1]) - middle
-        yield from _judge(
-            abs(off) / width,
-            LIP_LINE,
-            f"feature point {name}",
-            "lips meet on a level line through the corners",
-            f"{_mm(off, sign=True)} against their middle",
-            f"at most {_mm(LIP_LINE[0] * width)}",
-        )
+        rule = "lips meet on a level line through the corners"
+        found = f"{_mm(off, sign=True)} against their middle"
+        expected = f"at most {_mm(LIP_LINE[0] * width)}"
+        yield from _judge(abs(off) / width, LIP_LINE, f"feature point {name}", rule, found, expected)
 
 
 def _check_teeth(model: FaceModel) -> Iterator[Finding]:
@@ -176,23 +151,16 @@ def _check_teeth(model: FaceModel) -> Iterator[Finding]:
 
 
 def _check_touching(model: FaceModel, upper: str, lower: str, rule: str, limits: Limits) -> Iterator[Finding]:
-    """Yield a finding unless two feature points are at the same height. limits: shares of the mouth's
-    width."""
+    """Yield a finding unless two points are at the same height. limits: shares of the mouth's width."""
     width = model.fapu.MW * PER_DISTANCE
     gap = float(_point(model, upper)[1] - _point(model, lower)[1])
-    yield from _judge(
-        abs(gap) / width,
-        limits,
-        f"feature points {upper} and {lower}",
-        rule,
-        f"{_mm(abs(gap))} {'apart' if gap > 0 else 'into each other'}",
-        f"at most {_mm(limits[0] * width)}",
-    )
+    found = f"{_mm(abs(gap))} {'apart' if gap > 0 else 'into each other'}"
+    expected = f"at most {_mm(limits[0] * width)}"
+    yield from _judge(abs(gap) / width, limits, f"feature points {upper} and {lower}", rule, found, expected)
 
 
 def _surface(part: Part) -> Float64:
-    """Return the corners, edge midpoints and centres of a part's triangles: dense enough even for coarse
-    teeth."""
+    """Return corners, edge midpoints and centres of a part's triangles, dense enough for coarse teeth."""
     corners = part.vertices[part.triangles].astype(np.float64)
     edges = (corners + np.roll(corners, 1, axis=1)) / 2
     return np.concatenate([part.vertices, edges.reshape(-1, 3), corners.mean(axis=1)])
@@ -221,14 +189,10 @@ def _check_tongue(model: FaceModel) -> Iterator[Finding]:
         )
     boundary = (_point(model, "9.10") + _point(model, "9.11")) / 2
     off = float(tip[1] - boundary[1])
-    yield from _judge(
-        abs(off) / width,
-        TONGUE,
-        "feature point 6.1",
-        "tip of the tongue where the teeth meet",
-        f"{_mm(off, sign=True)} against 9.10 and 9.11",
-        f"at most {_mm(TONGUE[0] * width)}",
-    )
+    rule = "tip of the tongue where the teeth meet"
+    found = f"{_mm(off, sign=True)} against 9.10 and 9.11"
+    expected = f"at most {_mm(TONGUE[0] * width)}"
+    yield from _judge(abs(off) / width, TONGUE, "feature point 6.1", rule, found, expected)
     behind = float(_point(model, "9.11")[2] - tip[2])
     if np.isfinite(behind) and not -0.01 * width <= behind <= 0.2 * width:
         yield Finding(
@@ -252,18 +216,13 @@ def _check_symmetry(points: Float64) -> Iterator[Finding]:
     distance = np.linalg.norm(apart, axis=1)
     if distance.mean() > MAX_ASYMMETRY * unit:
         worst = list(MIRRORED.items())[int(np.flatnonzero(known)[int(distance.argmax())])]
-        yield Finding(
-            "left and right",
-            "symmetry",
-            f"{_mm(distance.mean())} on average, {_mm(distance.max())} for {worst[0]} and {worst[1]}",
-            f"{_mm(MAX_ASYMMETRY * unit)} on average, unless the face is meant so",
-            "warning",
-        )
+        found = f"{_mm(distance.mean())} on average, {_mm(distance.max())} for {worst[0]} and {worst[1]}"
+        expected = f"{_mm(MAX_ASYMMETRY * unit)} on average, unless the face is meant so"
+        yield Finding("left and right", "symmetry", found, expected, "warning")
 
 
 def _point(model: FaceModel, name: str) -> Float64:
-    point: Float64 = model.points[row_of()[name]]
-    return point
+    return np.asarray(model.points[row_of()[name]])
 
 
 def _judge(

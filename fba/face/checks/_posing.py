@@ -18,7 +18,6 @@ from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld
 from fba.face.checks._findings import Finding
 from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
-from fba.parameters import faps
 
 KIND_ORDER = ("scale", "rotation", "translation")
 """Order in which the transforms of a part act, as in a Transform node."""
@@ -43,28 +42,26 @@ class Poser:
     def findings(
         self, rule: str, faps: Iterable[int], check: Callable[[], Iterator[Finding]]
     ) -> tuple[Finding, ...]:
-        """Return what a check finds, cached: it depends only on the neutral face and the tables of these
-        FAPs."""
+        """Return what a check finds, cached by the neutral face and the tables of these FAPs."""
         key = (rule, *(self.model.table_of.get(fap, fap) for fap in faps))
         if key not in self._landmarks.findings:
             self._landmarks.findings[key] = tuple(check())
         return self._landmarks.findings[key]
 
     def pose(self, values: Mapping[int, float]) -> Float64:
-        """Return (V, 3) float64, metres: all vertices under FAP values by number, without the head's
-        rotation."""
+        """Return (V, 3) float64, metres: all vertices under FAP values by number; the head is not turned."""
         moved = self.neutral.copy()
         tables = [
             (self.model.table_of[fap], value) for fap, value in values.items() if fap in self.model.table_of
         ]
         for table, value in tables:
-            unit = self.model.fapu[faps()[table.fap - 1].unit]
+            unit = self.model.fapu.of_fap(table.fap)
             for mesh in table.meshes:
                 start = self.model.starts[mesh.part]
                 moved[mesh.vertices + start] += mesh.shift(value).astype(np.float64) * unit
         for part in self.model.parts:
             turns = [
-                (transform, value * self.model.fapu[faps()[table.fap - 1].unit])
+                (transform, value * self.model.fapu.of_fap(table.fap))
                 for table, value in tables
                 for transform in table.transforms
                 if transform.part == part.name and transform.part != HEAD
@@ -91,8 +88,7 @@ class Poser:
 
     def point(self, point: str) -> Float64:
         """Return (3,) a neutral feature point."""
-        position: Float64 = self.model.points[row_of()[point]]
-        return position
+        return np.asarray(self.model.points[row_of()[point]])
 
     @property
     def marks(self) -> Landmarks:
@@ -146,15 +142,12 @@ def _same_face(one: FaceModel, other: FaceModel) -> bool:
 
 
 def apply_transform(points: Float64, kind: str, amount: Float64, centre: npt.ArrayLike) -> Float64:
-    """Return the points (N, 3) after a "rotation" (vector, radians), "scale" (1 + amount) or "translation" by
-    (3,)."""
+    """Return points (N, 3) after a "rotation" (radians), "scale" (1 + amount) or "translation" by (3,)."""
     from scipy.spatial.transform import Rotation
 
     if kind == "translation":
         return points + amount
     arms = points - np.asarray(centre)
     if kind == "scale":
-        scaled: Float64 = np.asarray(centre) + arms * (1 + amount)
-        return scaled
-    turned: Float64 = Rotation.from_rotvec(amount).apply(arms) + np.asarray(centre)
-    return turned
+        return np.asarray(np.asarray(centre) + arms * (1 + amount))
+    return np.asarray(Rotation.from_rotvec(amount).apply(arms) + np.asarray(centre))

@@ -1,4 +1,1 @@
-"""Vertices and normals of a face for given FAPs: compiled loops over a model's tables.
-
-May use: the face model, meshes.
-"""
+"""Vertices and normals of a face for given FAPs: compiled loops over a model's tables."""

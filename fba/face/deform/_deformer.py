@@ -29,7 +29,7 @@ from fba.face.model import FaceModel
 from fba.mesh import result_array
 from fba.parameters import FAP_COUNT, faps
 
-BLOCK = 64
+FRAMES_PER_CALL = 64
 """Frames per call of the compiled loop: Ctrl-C takes effect between calls only."""
 
 
@@ -189,8 +189,8 @@ class Deformer:
         out_frames = out[None] if single else out
         normal_frames = out_frames[:0] if normals is None else normals[None] if single else normals
         with self._lock, np.errstate(all="ignore"):
-            for start in range(0, len(values), BLOCK):
-                stop = start + BLOCK
+            for start in range(0, len(values), FRAMES_PER_CALL):
+                stop = start + FRAMES_PER_CALL
                 self._loops.deform_frames(
                     values[start:stop],
                     self.model.vertices,

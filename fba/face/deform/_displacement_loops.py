@@ -79,10 +79,7 @@ def _add_value(shifts: Shifts, track: int, value: float, sign: float, moved: Flo
 
 @compiled
 def _add_part(shifts: Shifts, part: int, one: Float64, other: Float64, apart: bool, scratch: Scratch) -> bool:
-    """Add a part's shifts by FAPs `one` (68,) less those by `other`; return whether any differs.
-
-    apart: those of each to an array of its own instead, of all FAPs.
-    """
+    """Add a part's shifts by FAPs `one` less `other`; return whether any differs. apart: to two arrays."""
     differs = False
     for track in range(len(shifts.column)):
         if shifts.part[track] != part:

@@ -42,10 +42,7 @@ def copy(source: Array, target: Array) -> None:
 
 @compiled
 def add_shifts(values: Float64, shifts: Shifts, moved: Array, touched: Int64) -> None:
-    """Add to vertices `moved` (V, 3) the shifts by FAPs `values` (68,).
-
-    touched: (P,), set to 1 for each part that a FAP other than 0 has a FaceDefMesh for.
-    """
+    """Add to `moved` (V, 3) the shifts by FAPs (68,); set `touched` (P,) to 1 for parts that move."""
     for track in range(len(shifts.column)):
         value = values[shifts.column[track]]
         if value == 0.0:
@@ -149,16 +146,16 @@ def sum_normals(moved: Float32, surface: Surface, part: int) -> None:
         ux, uy, uz = moved[b, 0] - x, moved[b, 1] - y, moved[b, 2] - z
         vx, vy, vz = moved[c, 0] - x, moved[c, 1] - y, moved[c, 2] - z
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        i, j, l = corners[k, 0], corners[k, 1], corners[k, 2]  # noqa: E741
+        i, j, m = corners[k, 0], corners[k, 1], corners[k, 2]
         sum_x[i] += nx
         sum_y[i] += ny
         sum_z[i] += nz
         sum_x[j] += nx
         sum_y[j] += ny
         sum_z[j] += nz
-        sum_x[l] += nx
-        sum_y[l] += ny
-        sum_z[l] += nz
+        sum_x[m] += nx
+        sum_y[m] += ny
+        sum_z[m] += nz
 
 
 @compiled
@@ -318,10 +315,7 @@ def points_of_frames(
     with_head: bool,
     out: Float64,
 ) -> None:
-    """Write the positions of points for FAPs `values` (T, 68) to `out` (T, N, 3).
-
-    rest: (N, 3) neutral points. owner: (N,) the part whose transforms each point follows, or -1.
-    """
+    """Write points for FAPs (T, 68) to `out` (T, N, 3). owner: (N,) whose transforms they follow, or -1."""
     head = len(transforms.start) - 2
     poses = np.empty((head + 1, 3, 4))
     touched = np.zeros(head, dtype=np.int64)

@@ -8,7 +8,6 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Int32, Int64, Integer, Intp, UInt32
 from fba.face.model import FaceModel
-from fba.parameters import faps
 
 SEAM_COSINE = 0.7
 """Coincident vertices share a normal where their neutral normals differ by less than about 45 degrees. Along
@@ -92,8 +91,7 @@ def build_surface(model: FaceModel, moved_rows: Integer) -> Surface:
 
 
 def _sum_normals(vertices: Float64, triangles: Int32, corners: Int64, count: int) -> Float64:
-    """Return (count, 3) sums of the triangles' normals, as long as twice their area, over `corners` (F,
-    3)."""
+    """Return (count, 3) sums of the normals of triangles, twice their areas long, over corners (F, 3)."""
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     across = np.cross(b - a, c - a)
     summed = np.empty((count, 3))
@@ -142,6 +140,6 @@ def _test_motion(model: FaceModel, sign: float) -> Float64:
     for table in model.tables:
         value = sign * (200.0 + 37.0 * (table.fap * 29 % 67))
         for mesh in table.meshes:
-            shift = mesh.shift(value) * model.fapu[faps()[table.fap - 1].unit]
+            shift = mesh.shift(value) * model.fapu.of_fap(table.fap)
             moved[model.starts[mesh.part] + mesh.vertices] += shift
     return moved

@@ -1,4 +1,4 @@
-"""How far the vertices of a face are apart when it shows two sets of FAPs."""
+"""Distances of a face's vertices between two sets of FAPs, and how far one step of each FAP moves them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from fba.arrays import Float32, Float64, Int64
 from fba.face.deform._deformer import Deformer, frame_values
 from fba.face.deform.flat_tables import KIND_ORDER, Shifts, Transforms
 from fba.face.model import FaceModel
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
 
-BLOCK = 256
+FRAMES_PER_CALL = 256
 """Frames per call of the compiled loop: Ctrl-C takes effect between calls only."""
 VERTEX_BLOCK = 16
 """Frames whose vertices are in memory at once."""
@@ -20,6 +21,8 @@ BINS = 4000
 """Bins of the histogram of distances, up to `MAX_DISTANCE`."""
 MAX_DISTANCE = 0.02
 """Metres: larger percentiles are given as this."""
+LINEAR_REACH = 100
+"""Value of a FAP, both ways, between which its effect counts as linear."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +38,7 @@ class Displacements:
     counts: Int64
 
     def percentile(self, percent: float) -> float:
-        """Return the distance, metres, that this percentage of vertices is within, over all frames.
-
-        Only vertices that some FAP moves count.
-        """
+        """Return the distance, metres, within which this percentage of movable vertices is, in all frames."""
         wanted = percent / 100 * self.counts.sum()
         number = int(np.searchsorted(np.cumsum(self.counts), wanted))
         return number * MAX_DISTANCE / BINS
@@ -77,8 +77,8 @@ class DisplacementMeter:
         counts = np.zeros(BINS + 2, dtype=np.int64)
         model = self.model
         different = np.flatnonzero((first[:, 2:] != second[:, 2:]).any(axis=1))
-        for start in range(0, len(different), BLOCK):
-            frames = different[start : start + BLOCK]
+        for start in range(0, len(different), FRAMES_PER_CALL):
+            frames = different[start : start + FRAMES_PER_CALL]
             own_largest, own_worst = np.zeros(len(frames)), np.zeros(len(frames), dtype=np.int64)
             self._loops.measure_frames(
                 first[frames], second[frames], model.vertices, tables.part_start, tables.shifts,
@@ -125,3 +125,29 @@ def vertex_distances(deformer: Deformer, one: npt.ArrayLike, other: npt.ArrayLik
         shifts: Float32 = deformer.local(first[rows]) - deformer.local(second[rows])
         result[rows] = np.sqrt(np.einsum("tvi,tvi->tv", shifts, shifts).max(axis=1))
     return result
+
+
+def unit_motions(deformer: Deformer) -> Float64:
+    """Return the motion by 1 of each FAP at the vertices that any FAP moves most: float64 (68, P, 3), mm.
+
+    In the frame of the head: its rotation moves nothing. 0 for FAPs that the face does not show.
+    """
+    columns = range(FIRST_LOW_LEVEL_FAP - 1, FAP_COUNT)
+    peaks = set()
+    for column in columns:
+        size = np.linalg.norm(_unit_motion(deformer, column), axis=1)
+        if size.any():
+            peaks.add(int(size.argmax()))
+    vertices = sorted(peaks)
+    result = np.zeros((FAP_COUNT, len(vertices), 3))
+    for column in columns:
+        result[column] = _unit_motion(deformer, column)[vertices]
+    return result
+
+
+def _unit_motion(deformer: Deformer, column: int) -> Float64:
+    """Return the motion of all vertices by 1 of a FAP: float64 (V, 3), mm."""
+    poses = np.zeros((2, FAP_COUNT))
+    poses[:, column] = LINEAR_REACH, -LINEAR_REACH
+    there, back = deformer.local(poses).astype(np.float64)
+    return np.asarray((there - back) * (1000 / (2 * LINEAR_REACH)))

@@ -89,46 +89,39 @@ def bound_points(model: FaceModel) -> Members:
 
 
 def flatten_shifts(model: FaceModel, members: Members, dtype: type[np.floating[Any]]) -> Shifts:
-    """Return all FaceDefMesh for the given vertices, in metres, without displacements of zero.
-
-    Raises ModelError where a displacement is too large for the dtype.
-    """
+    """Return all FaceDefMesh for vertices, in metres, without zeros. ModelError where one is too large."""
     number = {part.name: k for k, part in enumerate(model.parts)}
-    column, part, first, upper, anchor, base, start = ([] for _ in range(7))  # type: ignore[var-annotated]
+    tracks: list[tuple[int, int, int]] = []  # column, part, first interval
+    intervals: list[tuple[float, float, int, int]] = []  # upper end, anchor, first row, first row in `bases`
     capacity = _count_rows(model, members, number)
     rows = np.empty(capacity, dtype=np.uint32)
     slopes, bases = np.empty((capacity, 3), dtype=dtype), np.empty((capacity, 3), dtype=dtype)
     count = base_count = 0
     for table in model.tables:
-        unit = model.fapu[faps()[table.fap - 1].unit]
+        unit = model.fapu.of_fap(table.fap)
         for mesh in table.meshes:
             own = number[mesh.part]
-            column.append(table.fap - 1)
-            part.append(own)
-            first.append(len(upper))
+            tracks.append((table.fap - 1, own, len(intervals)))
             for limit, from_value, moving, per_step, at_anchor in _cut_intervals(
                 mesh, *members[own], len(model.parts[own].vertices), unit
             ):
                 _check(per_step, at_anchor, dtype, f"FaceDefTables of FAP {table.fap}, part {mesh.part!r}")
-                upper.append(limit)
-                anchor.append(from_value)
-                start.append(count)
+                shifted = at_anchor.any()
+                intervals.append((limit, from_value, count, base_count if shifted else -1))
                 stop = count + len(moving)
                 rows[count:stop], slopes[count:stop] = moving, per_step
                 count = stop
-                shifted = at_anchor.any()
-                base.append(base_count if shifted else -1)
                 if shifted:
                     bases[base_count : base_count + len(at_anchor)] = at_anchor
                     base_count += len(at_anchor)
     return Shifts(
-        column=np.array(column, dtype=np.int64),
-        part=np.array(part, dtype=np.int64),
-        first=np.array([*first, len(upper)], dtype=np.int64),
-        upper=np.array(upper, dtype=np.float64),
-        anchor=np.array(anchor, dtype=np.float64),
-        start=np.array([*start, count], dtype=np.int64),
-        base=np.array(base, dtype=np.int64),
+        column=np.array([column for column, _, _ in tracks], dtype=np.int64),
+        part=np.array([part for _, part, _ in tracks], dtype=np.int64),
+        first=np.array([*(first for _, _, first in tracks), len(intervals)], dtype=np.int64),
+        upper=np.array([upper for upper, _, _, _ in intervals], dtype=np.float64),
+        anchor=np.array([anchor for _, anchor, _, _ in intervals], dtype=np.float64),
+        start=np.array([*(start for _, _, start, _ in intervals), count], dtype=np.int64),
+        base=np.array([base for _, _, _, base in intervals], dtype=np.int64),
         rows=rows[:count],
         slopes=slopes[:count],
         bases=bases[:base_count],
@@ -178,8 +171,7 @@ def _cut_intervals(mesh: FaceDefMesh, own: Intp, rows: Intp, size: int, unit: fl
 def _moves(shifts: Float64) -> Bool:
     """Return (N,) whether any of three components is not 0; several times faster than any(axis=1)."""
     nonzero = shifts != 0
-    moves: Bool = nonzero[:, 0] | nonzero[:, 1] | nonzero[:, 2]
-    return moves
+    return np.asarray(nonzero[:, 0] | nonzero[:, 1] | nonzero[:, 2])
 
 
 def _check(per_step: Float64, at_anchor: Float64, dtype: type[np.floating[Any]], where: str) -> None:
@@ -189,12 +181,11 @@ def _check(per_step: Float64, at_anchor: Float64, dtype: type[np.floating[Any]],
 
 
 def flatten_transforms(model: FaceModel) -> Transforms:
-    """Return the transforms of each part, nested as `Deformer` documents. ModelError where one is too
-    large."""
+    """Return the transforms of each part, nested as `Deformer` says. ModelError where one is too large."""
     names = [*(part.name for part in model.parts), HEAD]
     entries: list[list[tuple[tuple[int, float], int, list[float], tuple[float, ...]]]] = [[] for _ in names]
     for table in model.tables:
-        unit = model.fapu[faps()[table.fap - 1].unit]
+        unit = model.fapu.of_fap(table.fap)
         # yaw 49, roll 50, pitch 48: the order of the joints of the spine that the head stands on
         outward = HEAD_ROLL + 0.5 if table.fap == HEAD_PITCH else float(table.fap)
         for transform in table.transforms:

@@ -12,7 +12,6 @@ from fba.arrays import Float32, Float64, Int32
 from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names, row_of
-from fba.face.gltf._extension import NAME, VERSION
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Part
 from fba.gltf import (
@@ -28,6 +27,8 @@ from fba.gltf import (
 )
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
 
+NAME = "FBA_face"
+VERSION = 1
 MAX_PARTS = 1000
 MAX_NOTES = 1000
 MAX_BORDERS = 4096
@@ -53,16 +54,20 @@ def read_model(document: Document) -> FaceModel:
     for name, value in content.entries("morphValues", FAP_COUNT):  # only other programs use these
         _fap_number(name, value)
         value.number()
-    fit, wrinkles = content.get("fit"), content.get("wrinkles")
+    fit = None
+    if (given := content.get("fit")) is not None:
+        with locating_errors(given):
+            fit = InterpolationTable.from_dict(given.data)
+    title, wrinkles = content.get("name"), content.get("wrinkles")
     with locating_errors(content), np.errstate(all="ignore"):  # absurd sizes may overflow
         return FaceModel(
             parts=parts,
             points=points,
             bound=bound,
             tables=tuple(_table(document, entry, parts) for entry in content.elements(FAP_COUNT, "tables")),
-            fit=None if fit is None else _fit(fit),
+            fit=fit,
             definitions=_definitions(content),
-            name=_text(content, "name"),
+            name="" if title is None else title.text(),
             lost={_fap_number(key, value): value.text() for key, value in content.entries("lost", FAP_COUNT)},
             notes={key: value.text() for key, value in content.entries("notes", MAX_NOTES)},
             wrinkles=wrinkles is not None and wrinkles.boolean(),
@@ -121,11 +126,6 @@ def _points(content: Value, parts: tuple[Part, ...]) -> tuple[Float64, Int32]:
             part = value.member("part").index(len(parts), "part")
             bound[row] = starts[part] + vertex.index(len(parts[part].vertices), "vertex")
     return points, bound
-
-
-def _fit(value: Value) -> InterpolationTable:
-    with locating_errors(value):
-        return InterpolationTable.from_dict(value.data)
 
 
 def _definitions(content: Value) -> Definitions:
@@ -195,11 +195,6 @@ def _transform(entry: Value, parts: tuple[Part, ...]) -> FaceDefTransform:
 def _three(value: Value) -> tuple[float, float, float]:
     x, y, z = value.numbers(3)
     return x, y, z
-
-
-def _text(content: Value, key: str) -> str:
-    given = content.get(key)
-    return "" if given is None else given.text()
 
 
 def _fap_number(name: str, value: Value) -> int:

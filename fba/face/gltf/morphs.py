@@ -7,10 +7,8 @@ radians. A morph target moves vertices in straight lines, even where the FAP rot
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
@@ -19,20 +17,18 @@ from fba.errors import ModelError
 from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel
 from fba.parameters import FAP_COUNT, fap_numbers, faps
+from fba.text_files import packaged_rows
 
 
 @cache
 def morph_values() -> dict[int, int]:
     """Return the FAP value at weight 1, by FAP number, 3..68."""
-    with (files(__package__) / "morph_values.csv").open(encoding="utf-8") as file:
-        return {fap_numbers()[row["fap"]]: int(row["value"]) for row in csv.DictReader(file)}
+    rows = packaged_rows(__package__, "morph_values.csv")
+    return {fap_numbers()[row["fap"]]: int(row["value"]) for row in rows}
 
 
 def displacements(model: FaceModel) -> Iterator[tuple[int, Float32]]:
-    """Yield, for every table, the FAP's number and the shifts of vertices at its value, float32 (V, 3).
-
-    Raises ModelError for a shift that is not finite.
-    """
+    """Yield each table's FAP and its shifts at that value, float32 (V, 3); ModelError if not finite."""
     move = Deformer(model)
     neutral = move(np.zeros(FAP_COUNT))
     for table in model.tables:

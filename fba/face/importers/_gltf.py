@@ -6,17 +6,18 @@ Of VRM avatars, expressions say which morph targets are a blink or an open mouth
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fba.arrays import Float32, Float64
+from fba.easing import smoothstep
 from fba.errors import FormatError, ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers._both_sides import split_sides
 from fba.face.importers.assembly._pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.importers.assembly._repair import repair_tables
@@ -48,17 +49,22 @@ VRM_VISEMES = {
 }  # fmt: skip
 """Names of visemes and expressions (`assembly/visemes.csv`) by VRM's presets, in lower case."""
 VRM_SHAPES = {
-    "a": "jawOpen",
-    "aa": "jawOpen",
-    "blink": "eyesClosed",
-    "blink_l": "eyeBlinkLeft",
-    "blinkleft": "eyeBlinkLeft",
-    "blink_r": "eyeBlinkRight",
-    "blinkright": "eyeBlinkRight",
-}
+    "a": "jawOpen", "aa": "jawOpen", "blink": "eyesClosed",
+    "blink_l": "eyeBlinkLeft", "blinkleft": "eyeBlinkLeft",
+    "blink_r": "eyeBlinkRight", "blinkright": "eyeBlinkRight",
+}  # fmt: skip
 """ARKit's shapes by VRM's presets, in lower case."""
 MAX_EXPRESSIONS = 4096
 """Number of expressions that an avatar may have, and of morph targets that an expression may have."""
+BOTH_SIDES = {
+    "eyesclosed": "eyeBlink", "eyeblink": "eyeBlink", "eyesblink": "eyeBlink", "blink": "eyeBlink",
+    "vrcblink": "eyeBlink", "fcleyeclose": "eyeBlink", "mouthsmile": "mouthSmile", "smile": "mouthSmile",
+}  # fmt: skip
+"""ARKit's names, without the side, of shapes of both sides (in small letters only)."""
+MOVED_SHARE = 0.2
+"""Share of a shape's largest motion above which a vertex shows where the shape is."""
+BLEND_WIDTH = 0.1
+"""Width over which one side goes over into the other, as a share of the width of what moves."""
 
 
 def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
@@ -99,10 +105,7 @@ def _import_without_points(pieces: list[Piece], options: ImportOptions) -> FaceM
 
 
 def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Float64, float, dict[str, str]]:
-    """Return (pieces stood upright, their feature points (84, 3) in their unit, asymmetry, notes) of a head.
-
-    Raises ModelError as `find_points`.
-    """
+    """Return (pieces stood upright, feature points (84, 3), asymmetry, notes); errors as `find_points`."""
     from fba.face.importers.assembly._landmarks import find_eyes, find_points
 
     path = os.fspath(options.path)
@@ -110,12 +113,12 @@ def locate(pieces: list[Piece], options: ImportOptions) -> tuple[list[Piece], Fl
     assembled = assemble(upright, options.kinds)
     eyes = find_eyes(assembled, path)
     notes = {"feature points": "found by the shapes of the head, not given"}
-    upright, angle = stand_upright(upright, eyes["left"][0], eyes["right"][0], assembled)
+    upright, angle = stand_upright(upright, eyes["left"].centre, eyes["right"].centre, assembled)
     if angle:
         notes["position"] = f"turned by {np.degrees(angle):.1f} degrees, so that both sides are level"
         assembled = assemble(upright, options.kinds)
         eyes = find_eyes(assembled, path)
-    uneven = asymmetry(assembled, eyes["left"][0], eyes["right"][0])
+    uneven = asymmetry(assembled, eyes["left"].centre, eyes["right"].centre)
     points = find_points(assembled, path, symmetric=uneven < MIRRORED_POINTS, exactly=uneven < MIRRORED_LIDS)
     return upright, points, uneven, notes
 
@@ -250,3 +253,42 @@ def _vrm_expressions(gltf: Gltf) -> Iterator[tuple[str, list[Value], float]]:
     presets = None if expressions is None else expressions.get("preset")
     for name, expression in [] if presets is None else presets.members():
         yield name, expression.elements(MAX_EXPRESSIONS, "morphTargetBinds"), 1.0
+
+
+def split_sides(pieces: Sequence[Piece]) -> list[Piece]:
+    """Return the pieces, with shapes of both sides also cut into shapes of each side that the file lacks."""
+    result = list(pieces)
+    known = canonical_names(sorted({name for piece in pieces for name in piece.morphs}))
+    for name in sorted({name for piece in pieces for name in piece.morphs}):
+        shape = BOTH_SIDES.get(re.sub("[^a-z]", "", re.split(r"[.:|/]", name)[-1].lower()))
+        shape = shape or BOTH_SIDES.get(re.sub("[^a-z]", "", name.lower()))
+        sides = (f"{shape}Left", f"{shape}Right")
+        if shape is None or any(side in known for side in sides):
+            continue
+        ends = _ends(result, name)
+        if ends is None:
+            continue
+        known |= dict.fromkeys(sides, name)
+        middle, width = sum(ends) / 2, BLEND_WIDTH * (ends[1] - ends[0])
+        for k, piece in enumerate(result):
+            if name in piece.morphs:
+                x = piece.part.vertices[:, 0].astype(np.float64)
+                left = smoothstep((x - middle) / max(width, 1e-12) + 0.5)[:, None].astype(np.float32)
+                morph = piece.morphs[name]
+                both = {sides[0]: morph * left, sides[1]: morph * (1 - left)}
+                result[k] = replace(piece, morphs={**piece.morphs, **both})
+    return result
+
+
+def _ends(pieces: Sequence[Piece], name: str) -> tuple[float, float] | None:
+    """Return the least and the largest x of what a shape moves; None where it moves nothing."""
+    moving = [
+        (piece.part.vertices, np.linalg.norm(piece.morphs[name], axis=1))
+        for piece in pieces
+        if name in piece.morphs
+    ]
+    most = max((float(size.max(initial=0.0)) for _, size in moving), default=0.0)
+    if not most > 0:
+        return None
+    x = np.concatenate([vertices[size > MOVED_SHARE * most, 0] for vertices, size in moving])
+    return float(x.min()), float(x.max())

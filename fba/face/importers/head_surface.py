@@ -18,10 +18,10 @@ from fba.errors import ModelError, OptionError
 from fba.face.authoring.surface.binding import bind_points, face_size, separate_lips
 from fba.face.authoring.surface.landmarks import weld_skin
 from fba.face.feature_points import names
+from fba.face.importers import sniff
 from fba.face.importers._gltf import POINT_FILES as GLTF_POINT_FILES
 from fba.face.importers._gltf import gltf_pieces, locate
 from fba.face.importers._mesh import POINT_FILES, READERS, polygon_pieces, read_materials
-from fba.face.importers._sniffing import sniff
 from fba.face.importers.assembly._landmarks import find_eye_points
 from fba.face.importers.assembly._pieces import DROPPED, assemble, check_kinds, kind_of
 from fba.face.importers.assembly._polygon_parts import Piece
@@ -148,8 +148,7 @@ def _find(pieces: Sequence[Piece], options: ImportOptions) -> tuple[GivenPoints,
 def _in_file(
     pieces: Sequence[Piece], upright: Sequence[Piece], assembled: Sequence[Piece], points: Float64
 ) -> GivenPoints:
-    """Return the points (84, 3) of upright pieces as vertices of the file, those on none as positions in its
-    axes.
+    """Return points (84, 3) of upright pieces as the file's vertices, those on none as positions in its axes.
 
     assembled: the upright pieces as parts of a face.
     """

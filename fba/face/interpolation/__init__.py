@@ -1,4 +1,1 @@
-"""The FAP interpolation table (FIT): values that a stream leaves out, computed from those it sends.
-
-May use: parameters. Knows no model and no stream.
-"""
+"""The FAP interpolation table (FIT): values that a stream leaves out, computed from those it sends."""

@@ -18,14 +18,9 @@ VALUE_MAX = float(2**31 - 1)
 
 
 def evaluate(
-    table: InterpolationTable,
-    values: npt.NDArray[np.generic],
-    known: Bool,
-    viseme: Int16,
-    expression: Int16,
+    table: InterpolationTable, values: npt.NDArray[np.generic], known: Bool, viseme: Int16, expression: Int16
 ) -> tuple[Float64, Bool, Bool]:
-    """Return the FAP values with unknown ones filled in by a FIT: (values, known, from_high_level), all (T,
-    68).
+    """Return (values, known, from_high_level), all (T, 68): unknown FAPs filled in by a FIT.
 
     values: (T, 68). known: bool (T, 68), mask of those to keep; columns 0 and 1 say whether a viseme and an
     expression are in force. viseme: int16 (T, 4), expression: int16 (T, 6), their fields. Returns new
@@ -51,17 +46,9 @@ def evaluate(
 
 
 def estimate(
-    table: InterpolationTable,
-    values: npt.NDArray[np.generic],
-    known: Bool,
-    viseme: Int16,
-    expression: Int16,
+    table: InterpolationTable, values: npt.NDArray[np.generic], known: Bool, viseme: Int16, expression: Int16
 ) -> tuple[Float64, Bool]:
-    """Return what a FIT would give for each FAP if that one alone were unknown: (values, whether any), (T,
-    68).
-
-    The arguments are those of `evaluate`.
-    """
+    """Return what a FIT would give for each FAP if only that were unknown; arguments as of `evaluate`."""
     result = np.zeros(known.shape)
     given = np.zeros_like(known)
     numbers = _numbers(values.astype(np.float64), viseme, expression)
@@ -76,8 +63,7 @@ _Numbers = Callable[[str], Float64]
 
 
 def _numbers(filled: Float64, viseme: Int16, expression: Int16) -> _Numbers:
-    """Return a function that returns a FAP, or a field of a viseme or an expression, by name, as it is now:
-    (T,)."""
+    """Return a function from the name of a FAP, or of a viseme's or expression's field, to it: (T,)."""
     fields = {
         name: np.clip(array[:, column], 0, INTENSITY_MAX).astype(np.float64)
         for high, array in (("viseme", viseme), ("expression", expression))
@@ -85,8 +71,7 @@ def _numbers(filled: Float64, viseme: Int16, expression: Int16) -> _Numbers:
     }
 
     def number(name: str) -> Float64:
-        column: Float64 = fields[name] if name in fields else filled[:, fap_numbers()[name] - 1]
-        return column
+        return fields[name] if name in fields else filled[:, fap_numbers()[name] - 1]
 
     return number
 

@@ -113,8 +113,7 @@ class _Field:
         return len(self.numbers) - self.used
 
     def take(self, count: int, why: str) -> list[float]:
-        """Return the next numbers; ModelError where too few are left. why: what needs them, for the
-        message."""
+        """Return the next numbers; ModelError where too few are left, which says why they are needed."""
         if self.left < count:
             raise ModelError(
                 f"{self.name} of the FIT ends after {len(self.numbers)} numbers: {why} needs {count} more, "

@@ -32,10 +32,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Function:
-    """A destination FAP as numerator / denominator.
-
-    Both are sums of at most 10 terms; an empty numerator is 0, an empty denominator 1.
-    """
+    """A destination FAP as numerator (empty: 0) / denominator (empty: 1), sums of at most 10 terms."""
 
     numerator: Sequence[Term] = ()
     denominator: Sequence[Term] = ()

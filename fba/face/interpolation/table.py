@@ -112,8 +112,7 @@ def sources_of(links: Iterable[Link]) -> dict[int, set[int]]:
 
 
 def find_circle(links: Iterable[Link]) -> list[str]:
-    """Return the names of FAPs that depend on one another in a circle, the first again at the end; else
-    []."""
+    """Return the names of FAPs that depend on one another in a circle, the first also last; else []."""
     sources = sources_of(links)
     unvisited, path = set(sources), list[int]()
     while unvisited:

@@ -15,13 +15,14 @@ from fba.face.interpolation._terms import TERMS_MAX, Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import FAP_COUNT, faps
 
-HEAD = (47, 48, 49)
+HEAD_COLUMNS = (47, 48, 49)
 """Columns of the head's rotation: sent if they move; nothing is computed from them, nor they from others."""
-EYES = tuple(range(18, 30))
+EYE_COLUMNS = tuple(range(18, 30))
 """Columns of lids, eyeballs and pupils (group 3), which are computed only from one another. A gaze or a blink
 goes with the mouth in some streams by chance, and people see at once where it is wrong."""
-FACE = tuple(column for column in range(2, FAP_COUNT) if column not in HEAD + EYES)
+FACE_COLUMNS = tuple(column for column in range(2, FAP_COUNT) if column not in HEAD_COLUMNS + EYE_COLUMNS)
 """All other columns: jaw, lips, brows, cheeks, tongue, nose, ears."""
+REGIONS = (EYE_COLUMNS, FACE_COLUMNS)
 RIDGE = 1e-3
 """Share of a FAP's own energy that is added to it, so that coefficients stay small where FAPs go together."""
 
@@ -52,7 +53,7 @@ def measure(values: Int32) -> Moments:
     """Return the moments of values (T, 68)."""
     exact = values.astype(np.float64)
     equal = np.eye(FAP_COUNT, dtype=np.bool_)
-    for region in (HEAD, EYES, FACE):
+    for region in (HEAD_COLUMNS, EYE_COLUMNS, FACE_COLUMNS):
         for column in region:
             equal[column, region] = (values[:, region] == values[:, column, None]).all(axis=0)
     return Moments(exact.T @ exact, equal)
@@ -62,8 +63,7 @@ def add_up(parts: Iterable[Moments]) -> Moments:
     """Return the moments of several streams together."""
     listed = list(parts)
     return Moments(
-        np.sum([one.products for one in listed], axis=0),
-        np.logical_and.reduce([one.equal for one in listed]),
+        np.sum([one.products for one in listed], axis=0), np.logical_and.reduce([one.equal for one in listed])
     )
 
 
@@ -75,11 +75,11 @@ def choose_order(moments: Moments, metric: Float64, most: int) -> list[int]:
     metric: float64 (68, 68), the sum over these vertices of the product of two FAPs' motions, mm^2.
     """
     moving = moments.moving
-    chosen = [column for column in moving if column in HEAD]
+    chosen = [column for column in moving if column in HEAD_COLUMNS]
     while len(chosen) < min(most, len(moving)):
         rest = [column for column in moving if column not in chosen]
         lacking = [
-            region for region in (EYES, FACE) if set(region) & set(moving) and not set(region) & set(chosen)
+            region for region in REGIONS if set(region) & set(moving) and not set(region) & set(chosen)
         ]
         if most - len(chosen) <= len(lacking):
             rest = [column for column in rest if any(column in region for region in lacking)]
@@ -91,7 +91,7 @@ def choose_order(moments: Moments, metric: Float64, most: int) -> list[int]:
 def fewest(moments: Moments) -> int:
     """Return how many FAPs must be sent at least: the head's rotation, one of the eyes, one of the rest."""
     moving = set(moments.moving)
-    return len(moving & set(HEAD)) + sum(bool(moving & set(region)) for region in (EYES, FACE))
+    return len(moving & set(HEAD_COLUMNS)) + sum(bool(moving & set(region)) for region in REGIONS)
 
 
 def fit_coefficients(moments: Moments, sent: list[int]) -> Float64:
@@ -101,7 +101,7 @@ def fit_coefficients(moments: Moments, sent: list[int]) -> Float64:
     of the face sends nothing; for one that equals a sent FAP it is exactly 1 of that.
     """
     result = np.zeros_like(moments.products)
-    for region in (EYES, FACE):
+    for region in REGIONS:
         sources = [column for column in sent if column in region]
         for column in _computed(moments, sent, region):
             if moments.first(column) != column:
@@ -120,7 +120,7 @@ def make_table(coefficients: Float64) -> InterpolationTable:
     """Return the table with a link for the eyes and one for the rest, from the FAPs that are used."""
     names = [one.name for one in faps()]
     links = []
-    for region in (EYES, FACE):
+    for region in REGIONS:
         own = np.zeros_like(coefficients)
         own[:, region] = coefficients[:, region]
         used = np.flatnonzero(own.any(axis=1)).tolist()
@@ -153,17 +153,13 @@ def _most_useful(products: Float64, sources: list[int], column: int) -> tuple[li
 def _solve(products: Float64, sources: list[int], computed: list[int]) -> Float64:
     own = products[np.ix_(sources, sources)]
     across = products[np.ix_(sources, computed)]
-    solved: Float64 = np.linalg.solve(own + RIDGE * np.diag(np.diag(own)), across).astype(np.float64)
-    return solved
+    return np.linalg.solve(own + RIDGE * np.diag(np.diag(own)), across).astype(np.float64)
 
 
 def _error(moments: Moments, metric: Float64, sent: list[int]) -> float:
-    """Return the sum over frames of the squared error, mm^2, with these FAPs sent.
-
-    Eyes and the rest of the face move different vertices. Terms are not limited here.
-    """
+    """Return the sum of squared errors, mm^2, with these FAPs sent; the number of terms has no limit."""
     products, total = moments.products, 0.0
-    for region in (EYES, FACE):
+    for region in REGIONS:
         sources = [column for column in sent if column in region]
         computed = _computed(moments, sent, region)
         if not computed:

@@ -1,20 +1,19 @@
-"""`learn_fit`: an interpolation table (FIT) from the streams of a performer."""
+"""`learn_fit`: an interpolation table (FIT) from the streams of a performer, and its errors on a face."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fba.arrays import Bool, Float64, Int32
-from fba.errors import FbaError, FbaWarning, ModelError
+from fba.arrays import Bool, Float32, Float64, Int32
+from fba.errors import FbaError, ModelError, warn
 from fba.face.deform._deformer import Deformer
+from fba.face.deform.displacements import unit_motions, vertex_distances
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.learning._errors import ErrorSum, FitError
 from fba.face.learning._regression import (
-    HEAD,
+    HEAD_COLUMNS,
     add_up,
     choose_order,
     fewest,
@@ -23,7 +22,6 @@ from fba.face.learning._regression import (
     measure,
 )
 from fba.face.learning.reduction import linked_columns, send_sources
-from fba.face.learning.sensitivity import displacements
 from fba.face.model import FaceModel
 from fba.face.resolve import known_faps, resolve
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_steps, faps
@@ -39,6 +37,88 @@ UNSEEN_WEIGHT = 1e-9
 """mm^2 by which a step of a FAP counts more, so that those that the model does not show count at all."""
 _LOW_LEVEL = np.arange(1, FAP_COUNT + 1) >= FIRST_LOW_LEVEL_FAP
 """Which columns are not a viseme or an expression."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The mean of errors, the value that 1 % of them exceed, and the largest."""
+
+    mean: float
+    percentile_99: float
+    largest: float
+
+    @classmethod
+    def measure(cls, values: Float64) -> Spread:
+        """Return the spread of values (N,), N at least 1."""
+        return cls(float(values.mean()), float(np.quantile(values, 0.99)), float(values.max()))
+
+    def text(self) -> str:
+        """Return it in words, of millimetres."""
+        return (
+            f"{self.mean:.2f} mm off on average, {self.percentile_99:.2f} mm in the worst 1 %, "
+            f"{self.largest:.2f} mm at most"
+        )
+
+
+@dataclass(frozen=True)
+class FapError:
+    """Errors of one computed FAP.
+
+    fap: its number. steps: in steps of the standard's quantiser table. millimetres: the largest, at the
+    vertex that the FAP moves most; 0 for one that the face does not show.
+    """
+
+    fap: int
+    steps: Spread
+    millimetres: float
+
+
+@dataclass(frozen=True)
+class FitError:
+    """Errors of computed FAPs over all frames.
+
+    millimetres: of each frame's worst vertex, in the frame of the head. explained: the share of the motion
+    of the computed FAPs that is right: 1 - squared error / squared motion, both in mm. faps: of each.
+    """
+
+    millimetres: Spread
+    explained: float
+    faps: tuple[FapError, ...]
+
+
+class ErrorSum:
+    """Collects errors stream by stream."""
+
+    def __init__(self, deformer: Deformer, motion: Float64) -> None:
+        """motion: float64 (68, P, 3), mm, as `unit_motions` gives it."""
+        self._deformer = deformer
+        self._motion = motion
+        self._distances: list[Float64] = []
+        self._differences: list[Float64] = []
+        self._computed: list[Bool] = []
+        self._squares = np.zeros(2)
+
+    def add(self, wanted: Float32, shown: Float32, computed: Bool) -> None:
+        """Add frames. wanted, shown: float32 (T, 68). computed: bool (68,), FAPs to which a link leads."""
+        off = shown.astype(np.float64) - wanted
+        self._distances.append(vertex_distances(self._deformer, wanted, shown) * 1000)
+        self._differences.append(np.where(computed, np.abs(off), np.nan))
+        motion = self._motion[computed].reshape(int(computed.sum()), -1)
+        self._squares += [float(((values[:, computed] @ motion) ** 2).sum()) for values in (off, wanted)]
+
+    def result(self, columns: Sequence[int]) -> FitError:
+        """Return the errors of the frames that were added; those of FAPs in these columns one by one."""
+        differences = np.concatenate(self._differences)
+        reach = np.linalg.norm(self._motion, axis=2).max(axis=1, initial=0.0)
+        listed = []
+        for column in columns:
+            own = differences[~np.isnan(differences[:, column]), column]
+            if len(own):
+                steps = Spread.measure(own / fap_steps()[column])
+                listed.append(FapError(column + 1, steps, float(own.max() * reach[column])))
+        missed, moved = self._squares
+        explained = 1.0 - missed / moved if moved else 1.0
+        return FitError(Spread.measure(np.concatenate(self._distances)), float(explained), tuple(listed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +162,9 @@ def learn_fit(
     """
     if count < 1 or (tolerance is not None and not 0 < tolerance < np.inf):
         raise ValueError(f"count and tolerance must be positive and finite, not {count} and {tolerance}")
-    learner = _Learner(FaceModel.default() if model is None else model, [_determined(one) for one in tracks])
+    learner = _Learner(
+        FaceModel.default() if model is None else model, [known_faps(track)[0] for track in tracks]
+    )
     if tolerance is not None:
         count = learner.count_within(tolerance)
     learner.check(count)
@@ -115,7 +197,7 @@ class _Learner:
         self._part_moments = [measure(part) for part in self._parts]
         self._model = model
         self._deformer = Deformer(model)
-        self._motion = displacements(self._deformer)
+        self._motion = unit_motions(self._deformer)
         flat = self._motion.reshape(FAP_COUNT, -1)
         self.metric: Float64 = flat @ flat.T + np.diag(UNSEEN_WEIGHT / fap_steps().astype(np.float64) ** 2)
         self.moments = add_up(self._part_moments)
@@ -123,7 +205,7 @@ class _Learner:
 
     def _check_model(self, shown: Bool) -> None:
         """Warn of FAPs that move and are not shown, bool (68,); ModelError if none is."""
-        moving = [column for column in self.moments.moving if column not in HEAD]
+        moving = [column for column in self.moments.moving if column not in HEAD_COLUMNS]
         unseen = [f"{column + 1} {faps()[column].name}" for column in moving if not shown[column]]
         if moving and len(unseen) == len(moving):
             raise ModelError(
@@ -131,9 +213,8 @@ class _Learner:
                 "learn with one that does, such as the built-in head"
             )
         if unseen:
-            warnings.warn(
+            warn(
                 f"the model does not show FAP {', '.join(unseen)}: their errors do not count in millimetres",
-                FbaWarning,
                 stacklevel=4,
             )
 
@@ -199,8 +280,3 @@ class _Learner:
             others = add_up(self._part_moments[i] for i in indices if i not in fold)
             order = choose_order(others, self.metric, count)
             yield [self._parts[i] for i in fold], fit_coefficients(others, order)
-
-
-def _determined(track: FaceTrack) -> Int32:
-    """Return values (T, 68) of what was sent, and of what follows from it by the standard's rules."""
-    return known_faps(track)[0]

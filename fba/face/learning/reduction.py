@@ -34,10 +34,7 @@ def send_sources(track: FaceTrack, table: InterpolationTable) -> FaceTrack:
 
 
 def _copies(values: Int32, mask: Bool, linked: Bool) -> list[int]:
-    """Return columns of the mask that a face copies, as they are, from what is sent or computed.
-
-    values: int32 (T, 68). mask: bool (T, 68). linked: bool (68,).
-    """
+    """Return columns of the mask (T, 68) that a face copies from what is sent, or computed (`linked`)."""
     kept: Bool = np.asarray(mask.all(axis=0)) | linked
     copies: list[int] = []
     for column in range(FAP_COUNT - 1, 1, -1):  # outer lips before inner ones

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fba.body import BapSolver, Skeleton, convention_names
-from fba.body.solve._fast_trig import arc_tangent, sine_cosine
+from fba.body.solve._pose_loops import arc_tangent, sine_cosine
 from fba.body.solve.conventions import convention
 from fba.parameters import bap_numbers, baps
 

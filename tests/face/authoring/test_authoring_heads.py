@@ -12,7 +12,7 @@ from fba.errors import FbaWarning
 from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.checks import check_faps
-from fba.face.checks._lid_rules import MAX_GAP, SPLITS, lid_cut, lid_gap
+from fba.face.checks._combined_rules import MAX_GAP, SPLITS, lid_cut, lid_gap
 from fba.face.checks._posing import Poser
 from fba.face.importers import import_model
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fba.face.authoring.surface._fold_limits import LEAST_AREA, MOST_STRETCH, Limiter, Patch
-from fba.face.authoring.surface._unfold import _solve_harmonic
+from fba.face.authoring.surface._motion import _solve_harmonic
 from fba.face.authoring.surface.surface import Surface, weld_parts
 from fba.face.model import Part
 

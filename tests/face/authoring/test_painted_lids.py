@@ -17,7 +17,7 @@ from fba.face.checks._posing import Poser
 from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.model import FaceModel
-from fba.mesh._pictures import read_pixels
+from fba.mesh._materials import read_pixels
 from small_head import small_head
 
 BAND = 0.0045

@@ -19,8 +19,7 @@ from fba.errors import FbaWarning, FormatError, LimitError, ModelError
 from fba.face.gltf._reading import read_model
 from fba.face.gltf._storage import build, load
 from fba.face.model import FaceModel
-from fba.gltf._document import parse_document
-from fba.gltf._glb import join_container, split_container
+from fba.gltf._document import join_container, parse_document, split_container
 from json_places import REMOVED, put
 from stored_models import assert_same, face
 

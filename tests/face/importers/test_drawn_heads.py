@@ -11,10 +11,10 @@ from fba.face.authoring import author
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import eyeballs, fit_eyeball, flat_width
 from fba.face.feature_points import row_of
-from fba.face.importers._both_sides import split_sides
+from fba.face.importers._gltf import split_sides
 from fba.face.importers.assembly._definitions import define_by_shapes, named_shapes
 from fba.face.importers.assembly._landmarks import find_eyes
-from fba.face.importers.assembly._openings import mouth_points
+from fba.face.importers.assembly._outlines import mouth_points
 from fba.face.importers.assembly._pieces import assemble
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import FaceModel, Part

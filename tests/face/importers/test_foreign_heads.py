@@ -22,7 +22,7 @@ from fba.face.feature_points import MIRRORED, row_of
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._joining import join_pieces
-from fba.face.importers.assembly._openings import find_eye_loop, lid_points_of_loop
+from fba.face.importers.assembly._outlines import find_eye_loop, lid_points_of_loop
 from fba.face.importers.assembly._pieces import assemble
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.importers.assembly._repair import _stopped, repair_tables
@@ -75,8 +75,8 @@ def test_the_margins_of_the_built_in_heads_eyes() -> None:
         eye = eyeballs(head)[side]
         loop = find_eye_loop(surface, eye.centre, eye.radius)
         found = lid_points_of_loop(surface.vertices, loop, eye.centre[0])
-        for where, name in zip(("upper", "lower", "left", "right"), names, strict=True):
-            away = np.linalg.norm(surface.vertices[found[where]] - head.points[row_of()[name]])
+        for vertex, name in zip(found, names, strict=True):
+            away = np.linalg.norm(surface.vertices[vertex] - head.points[row_of()[name]])
             # the inner corner has a caruncle, which a loop may go around on either side
             assert away < (0.0045 if name in ("3.8", "3.11") else 0.0015), (name, away)
 

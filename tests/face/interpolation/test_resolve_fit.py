@@ -192,11 +192,11 @@ def test_sent_values_show_as_they_are(whole: FaceTrack) -> None:
 
 def test_an_hour_is_resolved_in_bounded_steps() -> None:
     """Blocks of any length: the border of the internal blocks shows nowhere."""
-    from fba.face.resolve import BLOCK
+    from fba.face.resolve import RESOLVED_AT_ONCE
 
-    count = BLOCK + 3
+    count = RESOLVED_AT_ONCE + 3
     values, mask = np.zeros((count, 68), dtype=int), np.zeros((count, 68), dtype=bool)
-    values[:, 2], mask[0, 2], mask[BLOCK + 1, 2] = 0, True, True
-    values[0, 2], values[BLOCK + 1, 2] = 40, 80
+    values[:, 2], mask[0, 2], mask[RESOLVED_AT_ONCE + 1, 2] = 0, True, True
+    values[0, 2], values[RESOLVED_AT_ONCE + 1, 2] = 40, 80
     faps = resolve(FaceTrack(values, mask), Face(CORNERS))
-    assert shown("stretch_l_cornerlip", faps) == pytest.approx([-10] * (BLOCK + 1) + [-20] * 2)
+    assert shown("stretch_l_cornerlip", faps) == pytest.approx([-10] * (RESOLVED_AT_ONCE + 1) + [-20] * 2)

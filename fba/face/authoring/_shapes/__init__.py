@@ -1,4 +1,1 @@
-"""Morph shapes of other programs turned into tables for FAPs.
-
-May use: authoring and the face model.
-"""
+"""Morph shapes of other programs turned into tables for FAPs."""

@@ -12,14 +12,8 @@ from fba.easing import smoothstep
 from fba.face._tables import FaceDefTables
 from fba.face.authoring._shapes._shapes import Shapes
 from fba.face.authoring.surface._fold_limits import Limiter
-from fba.face.authoring.surface._motion import Motion, build_tables, fap_limits, split_by_part
-from fba.face.authoring.surface._motion_limits import (
-    EASE,
-    MODERATE_VALUE,
-    coupled_motions,
-    linear_motion,
-)
-from fba.face.authoring.surface._unfold import ease_field
+from fba.face.authoring.surface._motion import Motion, build_tables, ease_field, fap_limits, split_by_part
+from fba.face.authoring.surface._motion_limits import EASE, MODERATE_VALUE, coupled_motions, linear_motion
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import Surface
 from fba.face.feature_points import row_of
@@ -49,12 +43,7 @@ GROUPS = (
 )  # fmt: skip
 """FAPs that sculptors move together: a shape raises a whole brow, a whole lip. Inner lips follow from
 the mesh, as shapes always move both contours."""
-REGIONS = (
-    (*range(31, 39),),
-    (*range(39, 43),),
-    (*range(4, 14), 16, 17, *range(51, 61)),
-    (*range(61, 65),),
-)
+REGIONS = ((*range(31, 39),), (*range(39, 43),), (*range(4, 14), 16, 17, *range(51, 61)), (*range(61, 65),))
 """FAPs that move the same area of skin."""
 
 
@@ -103,8 +92,7 @@ class Mixer:
         return np.asarray(field @ np.array(DIRECTIONS[entry.positive]) / self.base.fapu[entry.unit])
 
     def tables(self, group: tuple[int, ...]) -> tuple[dict[int, FaceDefTables], set[str]]:
-        """Return (tables of a group of FAPs made from shapes, names of the shapes); empty without fitting
-        shapes."""
+        """Return a group's tables made from shapes, and the names of these; empty without fitting shapes."""
         group = tuple(fap for fap in group if fap in self.base.table_of)
         group = tuple(fap for fap in group if faps()[fap - 1].feature_points[0] in self.points)
         details: dict[float, Float64] = {}
@@ -142,25 +130,18 @@ class Mixer:
         return made, used
 
     def _coupled_tables(
-        self,
-        inner_fap: int,
-        outer_fap: int,
-        inner: tuple[Float64, Float64],
-        outer: tuple[Float64, Float64],
+        self, inner_fap: int, outer_fap: int, inner: tuple[Float64, Float64], outer: tuple[Float64, Float64]
     ) -> dict[int, FaceDefTables]:
-        """Return the tables of both FAPs of a lip, limited where the skin would fold; together they go on.
-
-        inner, outer: (V, 3) metres a step, below and above 0.
-        """
+        """Return tables of a lip's FAPs, limited at folds, from (V, 3) metres a step below and above 0."""
         surface = self.shapes.surface
         limiter = Limiter.from_mesh(surface.vertices, surface.triangles)
         pinned = _pinned(surface, self.base)
         eased = []
         for side, end in enumerate(fap_limits(inner_fap)):
-            joint = _on_surface(surface, inner[side]) + _on_surface(surface, outer[side])
+            joint = surface.of_all(inner[side]) + surface.of_all(outer[side])
             around = ease_field(surface, limiter, joint, [_goal(end)] if end else [], pinned)
-            eased.append(_on_surface(surface, outer[side]) + around - joint)
-        skin = (_on_surface(surface, inner[0]), _on_surface(surface, inner[1]))
+            eased.append(surface.of_all(outer[side]) + around - joint)
+        skin = (surface.of_all(inner[0]), surface.of_all(inner[1]))
         pair = coupled_motions(limiter, skin, (eased[0], eased[1]), inner_fap)
         made: dict[int, FaceDefTables] = {}
         for fap, motion, (down, up) in zip((inner_fap, outer_fap), pair, (inner, outer), strict=True):
@@ -170,8 +151,7 @@ class Mixer:
         return made
 
     def _points_moved_together(self, group: tuple[int, ...]) -> dict[str, int]:
-        """Return the points that shapes move together, with their FAPs: those of a group and of its inner lip
-        mates."""
+        """Return the points that shapes move together and their FAPs: a group's and its inner lip mates'."""
         points = {faps()[fap - 1].feature_points[0]: fap for fap in group}
         for fap in group:
             mate = faps()[fap - 1].lip_mate
@@ -187,8 +167,7 @@ class Mixer:
         return float(morph_values()[fap])
 
     def _steps(self, group: tuple[int, ...]) -> Float64:
-        """Return (P, 3) displacement of each point by one step of all FAPs of a group and of their inner
-        mates."""
+        """Return (P, 3) shift of each point by one step of all FAPs of a group and of their inner mates."""
         wanted = np.zeros((len(self.points), 3))
         names = list(self.points)
         for name, fap in self._points_moved_together(group).items():
@@ -222,8 +201,7 @@ class Mixer:
         return np.asarray(solution / (shares.mean() * value) * sign)
 
     def _correct_at_points(self, group: tuple[int, ...], step: Float64) -> Float64:
-        """Return (V, 3) a group's step, faded out outside its region and corrected to be exact at all
-        points."""
+        """Return (V, 3) a group's step, faded out outside its region and corrected to be exact at points."""
         region = next(region for region in REGIONS if group[0] in region)
         inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
         step = step * smoothstep(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT)[:, None]
@@ -249,7 +227,7 @@ class Mixer:
 
 def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
     """Return (V, 3) metres a step: displacements by a FAP next to 0, above (sign 1) or below (-1) it."""
-    unit = model.fapu[faps()[fap - 1].unit]
+    unit = model.fapu.of_fap(fap)
     field = np.zeros((len(model.vertices), 3))
     for mesh in model.table_of[fap].meshes:
         zero = int(np.flatnonzero(mesh.borders == 0)[0])
@@ -259,8 +237,7 @@ def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:
 
 
 def fold_limited_tables(shapes: Shapes, fap: int, down: Float64, up: Float64) -> FaceDefTables | None:
-    """Return the tables of a FAP of the shapes' model, limited where the skin would fold, or None where
-    nothing moves.
+    """Return the tables of a FAP, limited where the skin would fold; None where nothing moves.
 
     down, up: (V, 3), metres a step below and above 0.
     """
@@ -268,8 +245,7 @@ def fold_limited_tables(shapes: Shapes, fap: int, down: Float64, up: Float64) ->
     pinned = _pinned(surface, model)
     low, high = fap_limits(fap)
     below, above = (
-        _one_way(surface, _on_surface(surface, field), end, pinned)
-        for field, end in ((down, low), (up, high))
+        _one_way(surface, surface.of_all(field), end, pinned) for field, end in ((down, low), (up, high))
     )
     values = np.array([*below.values[below.values < 0], 0.0, *above.values[above.values > 0]])
     moving = np.union1d(below.vertices, above.vertices)
@@ -283,16 +259,9 @@ def fold_limited_tables(shapes: Shapes, fap: int, down: Float64, up: Float64) ->
 
 
 def _tables(
-    model: FaceModel,
-    surface: Surface,
-    fap: int,
-    motion: Motion,
-    share: Float64,
-    down: Float64,
-    up: Float64,
+    model: FaceModel, surface: Surface, fap: int, motion: Motion, share: Float64, down: Float64, up: Float64
 ) -> FaceDefTables | None:
-    """Return the tables of a motion of the skin, which teeth, brows and lashes follow; None where nothing
-    moves.
+    """Return the tables of a motion of the skin, which teeth, brows and lashes follow; None without motion.
 
     share: (K,) steps that the skin has gone at each value of the motion. down, up: (V, 3), metres a step.
     """
@@ -305,7 +274,7 @@ def _tables(
         if len(moved):
             steps = np.where((share < 0)[:, None, None], down[own][moved], up[own][moved])
             motions[part.name] = Motion(motion.values, moved, steps * share[:, None, None])
-    made = build_tables(fap, model.fapu[faps()[fap - 1].unit], motions)
+    made = build_tables(fap, model.fapu.of_fap(fap), motions)
     return made if made.meshes else None
 
 
@@ -313,13 +282,6 @@ def _pinned(surface: Surface, model: FaceModel) -> Bool:
     """Return (N,) mask of the vertices of the surface that feature points stand on."""
     bound = surface.find(model.bound)
     return surface.mask(bound[bound >= 0])
-
-
-def _on_surface(surface: Surface, moves: Float64) -> Float64:
-    """Return (N, 3) displacements of a surface, of those (V, 3) of all vertices of the model."""
-    field = np.zeros((len(surface), 3))
-    field[surface.number] = moves[surface.pool]
-    return field
 
 
 def _goal(end: float) -> float:

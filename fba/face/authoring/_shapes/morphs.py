@@ -9,14 +9,13 @@ sculptor's shapes show.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.face._tables import FaceDefTables
 from fba.face.authoring._author import author_lids
 from fba.face.authoring._shapes._mixing import GROUPS, Mixer, fold_limited_tables
@@ -77,10 +76,9 @@ def add_shapes(base: FaceModel, morphs: Morphs) -> FaceModel:
     shapes = check_shapes(base, {shape: morphs[written] for shape, written in known.items()})
     if not shapes.halves:
         if morphs:
-            warnings.warn(
+            warn(
                 f"none of the {len(morphs)} shapes is named after one of ARKit's blendshapes or a FAP "
                 f"({', '.join(sorted(morphs)[:4])}); the tables are made from the mesh alone",
-                FbaWarning,
                 stacklevel=2,
             )
         return base

@@ -1,4 +1,1 @@
-"""How FAPs move each region of a face: jaw, lips, lids, eyes, tongue, ears, brows, cheeks, nose.
-
-May use: the surface, the face model.
-"""
+"""How FAPs move each region of a face: jaw, lips, lids, eyes, tongue, ears, brows, cheeks, nose."""

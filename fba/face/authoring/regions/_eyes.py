@@ -54,13 +54,11 @@ class Eye:
     def gaze(self) -> Float64:
         """Unit vector (3,) from the eye's centre to its pupil."""
         arm = self.pupil - self.centre
-        result: Float64 = arm / np.linalg.norm(arm)
-        return result
+        return arm / np.linalg.norm(arm)
 
 
 def find_eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
-    """Return both eyes; without an eyeball, the sphere that lids need is estimated from the feature
-    points."""
+    """Return both eyes; without an eyeball, the sphere that lids need is estimated from the points."""
     iris = marks.fapu.IRISD * 1024
     pupils = {side: marks.point_or_average(name) for side, name in (("left", "3.5"), ("right", "3.6"))}
     middle = float((pupils["left"][0] + pupils["right"][0]) / 2)
@@ -83,8 +81,7 @@ def find_eyes(marks: Landmarks, parts: Sequence[Part]) -> dict[str, Eye]:
 
 
 def _middle(part: Part) -> Float64:
-    ends: Float64 = (part.vertices.min(axis=0) + part.vertices.max(axis=0)).astype(np.float64) / 2
-    return ends
+    return np.asarray((part.vertices.min(axis=0) + part.vertices.max(axis=0)).astype(np.float64) / 2)
 
 
 def eye_transforms(fap: int, eye: Eye) -> list[FaceDefTransform]:
@@ -95,8 +92,7 @@ def eye_transforms(fap: int, eye: Eye) -> list[FaceDefTransform]:
 
 
 def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -> dict[str, Motion]:
-    """Return the motions by part that move the pupil's rim along the eyeball and compress the iris around
-    it."""
+    """Return the motions by part that move the pupil's rim along the eyeball and compress the iris."""
     unit = marks.fapu.IRISD
     iris = unit * 1024 / 2
     pupil = iris * PUPIL_OF_IRIS
@@ -130,10 +126,7 @@ def pupil_motions(marks: Landmarks, eye: Eye, fap: int, parts: Sequence[Part]) -
 
 
 def _depth(distance: Float64, along: Float64, wanted: Float64) -> Float64:
-    """Return the depth along the gaze of an eye's surface at the wanted distances from its axis.
-
-    distance, along: of its vertices, from the axis and along it, metres.
-    """
+    """Return the depth along the gaze of an eye's surface at wanted distances from its axis, metres."""
     front = along > 0
     order = np.argsort(distance[front], kind="stable")
     near, deep = distance[front][order], along[front][order]
@@ -144,5 +137,4 @@ def _depth(distance: Float64, along: Float64, wanted: Float64) -> Float64:
         return np.zeros_like(wanted)
     distances = [float(near[which == k].mean()) for k in used]
     depths = [float(deep[which == k].max()) for k in used]
-    result: Float64 = np.interp(wanted, distances, depths)
-    return result
+    return np.interp(wanted, distances, depths)

@@ -13,19 +13,22 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
-from fba.face.authoring.regions._eye_opening import CLOSED, LIDS, Opening, measure_opening, slide_lid
-from fba.face.authoring.regions._eyes import Eye
-from fba.face.authoring.regions._lid_clearance import (
+from fba.face.authoring.regions._eye_opening import (
+    CLOSED,
+    LIDS,
+    Opening,
     edge_length,
+    measure_opening,
     measure_profile,
     push_edges_outside,
     push_vertices_outside,
+    slide_lid,
 )
+from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.regions._painted_lids import painted_width
 from fba.face.authoring.surface._fold_limits import Limiter
-from fba.face.authoring.surface._motion import Motion, fap_limits
+from fba.face.authoring.surface._motion import Motion, fap_limits, unfold
 from fba.face.authoring.surface._motion_limits import stop_at_folds
-from fba.face.authoring.surface._unfold import unfold
 from fba.face.authoring.surface._weights import average_with_neighbours, trim_small
 from fba.face.authoring.surface.attached_parts import hair_roots
 from fba.face.authoring.surface.landmarks import Landmarks
@@ -144,11 +147,7 @@ def lid_motion(
 
 
 def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift: Float64) -> Float64 | None:
-    """Return (N,) share of the margin's motion at each vertex in a shape; None where that moves this lid
-    little.
-
-    shift: (N, 3) displacements of the surface by the shape, metres.
-    """
+    """Return (N,) shares of the margin's motion in a shape (N, 3); None where it moves this lid little."""
     side, sign = eye.side, (-1.0 if lid == "upper" else 1.0)
     own, other = marks.contour(f"{side} {lid} lid"), marks.contour(f"{side} {_other(lid)} lid")
     arms = marks.surface.vertices - eye.centre
@@ -195,13 +194,7 @@ def _other(lid: str) -> str:
 
 
 def _share(
-    marks: Landmarks,
-    opening: Opening,
-    eye: Eye,
-    lid: str,
-    own: Intp,
-    other: Intp,
-    parts: Sequence[Part],
+    marks: Landmarks, opening: Opening, eye: Eye, lid: str, own: Intp, other: Intp, parts: Sequence[Part]
 ) -> Float64:
     """Return (N,) share of the margin's motion at each vertex of a column.
 
@@ -242,8 +235,7 @@ def _share(
 
 
 def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: float) -> Float64:
-    """Return (N,) share by which the front edge of a lid must move further than the margin to meet the
-    other's.
+    """Return (N,) share by which a lid's front edge moves further than the margin, to meet the other's.
 
     The margin lies on the eyeball; the front edge before it is further away from the other lid.
     """
@@ -257,10 +249,7 @@ def _overhang(points: Float64, opening: Opening, eye: Eye, lid: str, widest: flo
 
 
 def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) -> Motion:
-    """Return the motion of a part's lashes for a lid's FAP: each vertex turns as its root on the margin does.
-
-    skin: the motion of the surface for that FAP.
-    """
+    """Return the motion of a part's lashes: each vertex turns as its root does in the skin's motion."""
     from scipy.spatial import cKDTree
 
     side, lid = LIDS[fap]

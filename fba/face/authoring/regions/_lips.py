@@ -15,13 +15,8 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
 from fba.face.authoring.surface._fold_limits import Limiter
-from fba.face.authoring.surface._motion import Motion
-from fba.face.authoring.surface._motion_limits import (
-    coupled_motions,
-    eased_linear_motion,
-    values_to_reach,
-)
-from fba.face.authoring.surface._unfold import ease_field
+from fba.face.authoring.surface._motion import Motion, ease_field
+from fba.face.authoring.surface._motion_limits import coupled_motions, eased_linear_motion, values_to_reach
 from fba.face.authoring.surface._weights import reachable_region, solve_smooth_field, trim_small
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.parameters import faps
@@ -129,8 +124,7 @@ def _missing_reason(marks: Landmarks, number: int) -> str:
 
 
 def _twin(marks: Landmarks, point: str) -> str:
-    """Return the corner or middle of a lip on whose vertex a point between them stands; empty where none
-    is."""
+    """Return the corner or middle of a lip that shares its vertex with a point between them, else ""."""
     ends = ENDS.get(point, ())
     return next(
         (end for end in ends if marks.has(end, point) and marks.vertex[end] == marks.vertex[point]), ""

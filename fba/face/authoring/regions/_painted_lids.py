@@ -19,7 +19,7 @@ GAMMA = 2.2
 """Exponent from pictures' values to the linear light of vertices' colours, near enough to compare them."""
 STRIPS = 8
 """Number of strips, side by side, into which a lid is cut; each is measured separately."""
-STEPS = 24
+MARGIN_STEPS = 24
 """Number of distances from the margin, up to `MAX_DISTANCE`, at which a strip is measured."""
 MAX_DISTANCE = 2.0
 """Distance from the margin, in distances of the crease, up to which paint is looked for; skin begins at 1."""
@@ -34,26 +34,25 @@ SAMPLES = 12
 def painted_width(
     marks: Landmarks, opening: Opening, eye: Eye, lid: str, parts: Sequence[Part], crease: float
 ) -> float:
-    """Return the distance from a lid's margin along the skin, metres, up to which it is painted dark; 0
-    without paint.
+    """Return the distance from a lid's margin up to which its skin is painted dark, metres; else 0.
 
     crease: distance of the lid's crease from the margin, metres. The colour is that of the skin's texture and
     of its vertices; a picture that cannot be read is taken for plain.
     """
     away, column, brightness = _samples(marks, opening, eye, lid, parts, MAX_DISTANCE * crease)
     strip = np.floor((column - opening.x[0]) / (opening.x[-1] - opening.x[0]) * STRIPS)
-    step = np.minimum(away / (MAX_DISTANCE * crease) * STEPS, STEPS - 1).astype(np.intp)
+    step = np.minimum(away / (MAX_DISTANCE * crease) * MARGIN_STEPS, MARGIN_STEPS - 1).astype(np.intp)
     widths = []
     for number in range(STRIPS):
         here = strip == number
-        line = np.array([_median(brightness[here & (step == each)]) for each in range(STEPS)])
+        line = np.array([_median(brightness[here & (step == each)]) for each in range(MARGIN_STEPS)])
         skin = _median(brightness[here & (away > crease)])
         seen = np.flatnonzero(np.isfinite(line))
         if len(seen) and skin > 0:
-            line = np.interp(np.arange(STEPS), seen, line[seen]) / skin
+            line = np.interp(np.arange(MARGIN_STEPS), seen, line[seen]) / skin
             ends = np.flatnonzero(line > BRIGHT_SHARE)
             dark = line[0] < DARK_SHARE and len(ends) > 0
-            widths.append(ends[0] * MAX_DISTANCE * crease / STEPS if dark else 0.0)
+            widths.append(ends[0] * MAX_DISTANCE * crease / MARGIN_STEPS if dark else 0.0)
     return float(np.median(widths)) if widths else 0.0
 
 

@@ -1,4 +1,7 @@
-"""The lower jaw: FAP 3 open_jaw, a hinge about the ears, and FAPs 14 and 15, which slide it."""
+"""The lower jaw and the tongue.
+
+FAP 3 open_jaw turns the jaw about a hinge at the ears, FAPs 14 and 15 slide it; FAPs 43-47 move the tongue.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,14 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.easing import smoothstep
-from fba.face.authoring.surface._motion import fap_limits
+from fba.face.authoring.surface._fold_limits import Limiter
+from fba.face.authoring.surface._motion import Motion, fap_limits
+from fba.face.authoring.surface._motion_limits import human_range, linear_motion, stop_at_folds
 from fba.face.authoring.surface._weights import reachable_region, solve_smooth_field, trim_small
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.model import Part
-from fba.face.points import OPEN_JAW
+from fba.face.points import OPEN_JAW, TONGUE_ROLL
 
 CHIN = ("2.1", "2.10", "2.11", "2.12")
 EARS = ("10.7", "10.8", "10.9", "10.10")
@@ -47,6 +52,12 @@ ONE_JAW_MARGIN = 0.15
 """Teeth of which half plus this share lies on one side of their common edge belong to one jaw."""
 LIP_DEPTH = 0.16
 """Distance from the lips beyond which the inside of the mouth moves as the jaws do, in ES0."""
+TONGUE_FAPS = (43, 44, 45, 46, 47)
+TONGUE_POINTS = {43: ("6.1",), 44: ("6.1",), 45: ("6.1",), 46: ("6.2",), 47: ("6.2", "6.3", "6.4")}
+TIP_BEND = 2.0
+"""Power of the length with which the tip's motion falls off to the root, so that the tongue bends."""
+ROLL_STEPS = 8
+"""Number of values at which the roll is computed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +133,7 @@ def below_bite(marks: Landmarks, points: Float64, hinge: Float64) -> Float64:
     reach = max(front[2] - hinge[1], 1e-6)
     ahead = np.clip((points[:, 2] - hinge[1]) / reach, 0.2, None)
     plane = hinge[0] + (bite_height(marks) - hinge[0]) * ahead
-    result: Float64 = plane - points[:, 1]
-    return result
+    return np.asarray(plane - points[:, 1])
 
 
 def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
@@ -147,8 +157,7 @@ def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
         mean = np.bincount(shape.component, each) / count
         in_one_jaw = np.abs(mean - 0.5) > ONE_JAW_MARGIN
         each = np.where(in_one_jaw[shape.component], (mean > 0.5)[shape.component], each)
-    result: Float64 = each[shape.number]
-    return result
+    return each[shape.number]
 
 
 ROWS = {0.0: "upper", 1.0: "lower"}
@@ -206,8 +215,7 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
 
 
 def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
-    """Return (M,) shares along the jaw line: 1 between the corners of the chin, less towards those of the
-    jaw."""
+    """Return (M,) shares along the jaw line: 1 between the corners of the chin, less towards the jaw's."""
     chin = np.flatnonzero(np.isin(line, marks.vertices_of(CHIN)))
     steps = np.linalg.norm(np.diff(marks.surface.vertices[line], axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
@@ -242,3 +250,53 @@ def _from_corners(marks: Landmarks, vertices: Intp) -> Float64:
     left, right = marks.point_or_average("2.4")[0], marks.point_or_average("2.5")[0]
     across = (x - right) / (left - right)
     return smoothstep(3.5 * np.minimum(across, 1 - across) - 0.5)
+
+
+def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
+    """Return the motion of the tongue's part for a FAP, or the reason why it cannot be made."""
+    missing = [name for name in TONGUE_POINTS[fap] if np.isnan(marks.point(name)).any()]
+    if missing:
+        return f"feature point {missing[0]} is unknown"
+    points = part.vertices.astype(np.float64)
+    limiter = Limiter.from_mesh(points, part.triangles.astype(np.intp))
+    if fap == TONGUE_ROLL:
+        return stop_at_folds(limiter, _tongue_roll(marks, points))
+    tip = marks.point("6.1")
+    root = float(points[:, 2].min())
+    if tip[2] - root <= 0:
+        return "the tongue's tip (6.1) is not before its root"
+    length = np.clip((points[:, 2] - root) / (tip[2] - root), 0.0, 1.0)
+    if fap == 46:
+        middle = (marks.point("6.2")[2] - root) / (tip[2] - root)
+        if not 0 < middle < 1:
+            return "the tongue's body (6.2) is not between its root and its tip"
+        share = np.where(
+            length < middle, smoothstep(length / middle), smoothstep((1 - length) / (1 - middle))
+        )
+    elif fap == 45:
+        share = length
+    else:
+        share = length**TIP_BEND
+    field = share[:, None] * marks.step(fap)
+    return linear_motion(limiter, np.arange(len(points)), field, *fap_limits(fap), human_range(fap))
+
+
+def _tongue_roll(marks: Landmarks, points: Float64) -> Motion:
+    """Return the motion that turns the sides up about the middle line, more further out: a U in section."""
+    middle, left, right = (marks.point(name) for name in ("6.2", "6.3", "6.4"))
+    unit = marks.fapu.AU
+    low, high = fap_limits(TONGUE_ROLL)
+    steps = np.append(np.linspace(low, 0.0, 3), np.linspace(0.0, high, ROLL_STEPS + 1))
+    values: Float64 = np.unique(np.round(steps)).astype(np.float64)
+    half = (left[0] - right[0]) / 2
+    x, y = points[:, 0] - middle[0], points[:, 1] - middle[1]
+    root, tip = float(points[:, 2].min()), float(points[:, 2].max())
+    along = (
+        smoothstep((points[:, 2] - root) / max(left[2] - root, 1e-9)) if tip > root else np.ones(len(points))
+    )
+    shifts = np.zeros((len(values), len(points), 3))
+    for k, value in enumerate(values):
+        turn = value * unit * np.clip(x / half, -1.2, 1.2) * along
+        shifts[k, :, 0] = x * np.cos(turn) - y * np.sin(turn) - x
+        shifts[k, :, 1] = x * np.sin(turn) + y * np.cos(turn) - y
+    return Motion(values, np.arange(len(points)), shifts)

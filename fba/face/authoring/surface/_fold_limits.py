@@ -30,10 +30,7 @@ DEGENERATE_AREA = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Limiter:
-    """Measures how far motions of a mesh can go; made by `from_mesh`.
-
-    vertices: (N, 3), neutral, metres. triangles: (F, 3), those that can fold.
-    """
+    """Measures how far motions of a mesh can go: vertices (N, 3), metres, and triangles that can fold."""
 
     vertices: Float64
     triangles: Intp
@@ -76,10 +73,7 @@ class Limiter:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Triangles of a mesh, measured once for all motions that are tried on them.
-
-    vertices: (N, 3), neutral, metres, those of the whole mesh. triangles: (M, 3).
-    """
+    """Triangles (M, 3) of a mesh of vertices (N, 3), metres, measured once for all motions to try."""
 
     vertices: Float64
     triangles: Intp
@@ -133,12 +127,10 @@ class Patch:
     @cached_property
     def _local_corners(self) -> Intp:
         """(M, 3) the corners of the triangles, counted through the vertices of this patch."""
-        corners: Intp = np.unique(self.triangles, return_inverse=True)[1].reshape(-1, 3)
-        return corners
+        return np.unique(self.triangles, return_inverse=True)[1].reshape(-1, 3)
 
     def _facing_neighbours(self, normals: Float64) -> Float64:
-        """Return (M,) cosine between the normal (M, 3) of each triangle and that of its neighbours by any
-        vertex."""
+        """Return (M,) cosine between each triangle's normal (M, 3) and that of those around it."""
         around = self._sum_around(normals) - 3 * normals
         product = lengths(around) * lengths(normals)
         result: Float64 = dot(around, normals) / np.maximum(product, 1e-30)
@@ -152,8 +144,7 @@ class Patch:
             return np.zeros((0, 3))
         sums = np.stack([np.bincount(corners.ravel(), np.repeat(axis, 3)) for axis in normals.T], axis=1)
         low, middle, high = np.sort(corners, axis=1).T
-        around: Float64 = sums[low] + sums[middle] + sums[high]
-        return around
+        return np.asarray(sums[low] + sums[middle] + sums[high])
 
     @cached_property
     def _folded_before(self) -> Bool:
@@ -168,8 +159,7 @@ class Patch:
         return tuple((square, MOST_STRETCH**2 * np.maximum(square, shortest) - square) for square in squares)
 
     def reach(self, field: Float64) -> Float64:
-        """Return (M,) for each triangle the largest s at which vertices + s * field (N, 3) keeps it
-        unfolded."""
+        """Return (M,) the largest s at which vertices + s * field (N, 3) keeps each triangle unfolded."""
         a, b, c = self.triangles.T
         first = field[a]
         d1, d2 = field[b] - first, field[c] - first
@@ -188,10 +178,7 @@ class Patch:
         return float(self.reach(field).min(initial=np.inf))
 
     def is_sound(self, shifts: Float64, *, turning: bool = False) -> bool:
-        """Return whether no triangle folds or tears at vertices + shifts (N, 3).
-
-        turning: as in `soundness`; then tiny folds (`MAX_FOLDED_SHARE`) at eyes and mouth are allowed.
-        """
+        """Return whether no triangle folds or tears under shifts (N, 3), but for tiny folds if `turning`."""
         fine = self.soundness(shifts, turning=turning)
         if not turning or fine.all():
             return bool(fine.all())
@@ -218,8 +205,7 @@ class Patch:
 
 
 def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:
-    """Return the smallest positive x with square x² + linear x + constant = 0, inf without one; constant >
-    0."""
+    """Return the smallest x > 0 with square x² + linear x + constant = 0, else inf. constant > 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         below = linear**2 - 4 * square * constant
         root = np.sqrt(np.maximum(below, 0.0))
@@ -228,5 +214,4 @@ def _first_root(square: Float64, linear: Float64, constant: Float64) -> Float64:
         roots = np.stack([q / square, constant / q])
     roots[:, below < 0] = np.inf
     roots[~(roots > 0)] = np.inf
-    result: Float64 = roots.min(axis=0)
-    return result
+    return np.asarray(roots.min(axis=0))

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
 from fba.face.authoring.surface._fold_limits import Limiter, Patch
-from fba.face.authoring.surface._motion import Motion, fap_limits
-from fba.face.authoring.surface._unfold import ease_field
+from fba.face.authoring.surface._motion import Motion, ease_field, fap_limits
 from fba.face.authoring.surface.surface import Surface
+from fba.text_files import packaged_rows
 
 EASE = (0.75, 1.25)
 """Shares of the largest value without folds at which a motion slows to half speed, and at which it stops."""
@@ -46,17 +44,15 @@ def values_between(low: float, high: float, *bends: float) -> Float64:
 
 @cache
 def _human_ranges() -> dict[int, tuple[float, float]]:
-    with (files(__package__) / "human_ranges.csv").open(encoding="utf-8") as file:
-        return {
-            int(fap): (float(row["low"]), float(row["high"]))
-            for row in csv.DictReader(file)
-            for fap in row["faps"].split()
-        }
+    return {
+        int(fap): (float(row["low"]), float(row["high"]))
+        for row in packaged_rows(__package__, "human_ranges.csv")
+        for fap in row["faps"].split()
+    }
 
 
 def human_range(fap: int) -> tuple[float, float]:
-    """Return the sizes of the smallest and largest value of a FAP on human faces, with a margin; inf if not
-    listed."""
+    """Return how far a FAP goes on human faces, below and above 0, with a margin; inf if not listed."""
     return _human_ranges().get(fap, (np.inf, np.inf))
 
 
@@ -90,8 +86,7 @@ def linear_motion(
     high: float,
     most: tuple[float, float] = (np.inf, np.inf),
 ) -> Motion:
-    """Return the motion by value x field (N, 3) metres between two values, limited where triangles would
-    fold.
+    """Return the motion by value x field (N, 3) metres, limited where triangles would fold.
 
     low, high: the range of values. most: sizes of the values, below 0 and above, that it never exceeds.
     The field is not eased.
@@ -148,17 +143,13 @@ def coupled_motions(
 
 
 def _largest_value(patch: Patch, field: Float64, limit: float) -> float:
-    """Return the value that a linear motion (N, 3) reaches without folds, at least 1; inf from `LEAST_REACH`
-    on."""
+    """Return the value >= 1 that a linear motion (N, 3) reaches without folds; inf from `LEAST_REACH` on."""
     reach = patch.least_reach(field)
     return np.inf if LEAST_REACH * reach >= limit else max(reach, 1.0)
 
 
 def stop_at_folds(limiter: Limiter, motion: Motion, *, turning: bool = False) -> Motion:
-    """Return the motion, stopped on each side of 0 where it would fold triangles.
-
-    turning: as in `Patch.soundness`.
-    """
+    """Return the motion, stopped where it would fold triangles. turning: as in `Patch.soundness`."""
     patch = limiter.patch(motion.vertices)
 
     def is_sound(shifts: Float64) -> bool:

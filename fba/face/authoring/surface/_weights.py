@@ -54,20 +54,14 @@ def solve_smooth_field(
 
 
 def reachable_region(near: Float64, far: Float64, reach: float, share: float = 0.8) -> Bool:
-    """Return (N,) mask of vertices within `reach` and at most `share` of the distance to vertices that must
-    stay.
-
-    near, far: (N,) distances from moved and from fixed vertices, metres.
-    """
+    """Return (N,) mask of vertices near the moved, within `reach` and `share` of the way to the fixed."""
     with np.errstate(invalid="ignore"):
         return (near < reach) & (near < share * (near + far))
 
 
 def trim_small(field: Float64, least: float = MIN_SHARE) -> Float64:
-    """Return a field with values below `least` set to 0 and 1 staying 1, so that vertices that barely move
-    rest."""
-    result: Float64 = np.sign(field) * np.maximum(np.abs(field) - least, 0.0) / (1 - least)
-    return result
+    """Return a field with values below `least` set to 0 and 1 unchanged, so that slow vertices rest."""
+    return np.sign(field) * np.maximum(np.abs(field) - least, 0.0) / (1 - least)
 
 
 def average_with_neighbours(surface: Surface, field: Float64, rounds: int) -> Float64:
@@ -81,8 +75,7 @@ def average_with_neighbours(surface: Surface, field: Float64, rounds: int) -> Fl
 
 
 def carry_through(surface: Surface, field: Float64, targets: Intp, length: float) -> Float64:
-    """Return a field (N,) that target vertices take over from skin up to `length` metres away in a straight
-    line.
+    """Return a field (N,) that targets take over from skin up to `length` metres away in a straight line.
 
     Surfaces behind moving skin, such as the inside of a nostril, move with it.
     """

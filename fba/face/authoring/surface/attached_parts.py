@@ -36,8 +36,7 @@ class Anchors:
     distance: Float64
 
     def carry(self, motion: Motion) -> Motion:
-        """Return the motion of the part for a motion of the surface: vertices move and turn with their
-        triangles."""
+        """Return the part's motion for one of the surface: vertices move and turn with their triangles."""
         neutral = self.surface.vertices
         corners = self.surface.triangles[self.triangles]
         moving = np.flatnonzero(self.surface.mask(motion.vertices)[corners].any(axis=1))
@@ -57,8 +56,7 @@ class Anchors:
 
 
 def attach(surface: Surface, part: Part) -> Anchors:
-    """Return the attachment of a part to the nearest triangles of the skin; lashes hang on it by their
-    roots."""
+    """Return the attachment of a part to the nearest triangles of the skin; lashes hang by their roots."""
     from scipy.spatial import cKDTree
 
     shape = weld_parts([part])
@@ -76,10 +74,7 @@ def attach(surface: Surface, part: Part) -> Anchors:
 
 
 def hair_roots(shape: Surface, away: Float64) -> Intp:
-    """Return (N,) for each vertex of hairs the root vertex that it grows from, along the hair.
-
-    away: (N,) distances from the skin; roots are the nearest vertices of each connected piece.
-    """
+    """Return (N,) the root of each vertex along its hair; roots are nearest to the skin, by `away` (N,)."""
     from scipy.sparse.csgraph import dijkstra
 
     nearest = np.full(int(shape.component.max(initial=-1)) + 1, np.inf)
@@ -87,8 +82,7 @@ def hair_roots(shape: Surface, away: Float64) -> Intp:
     span = float(np.median(np.linalg.norm(np.diff(shape.vertices[shape.edges], axis=1), axis=2)))
     start = np.flatnonzero(away <= nearest[shape.component] + ROOT * span)
     root = dijkstra(shape.graph, directed=False, indices=start, min_only=True, return_predecessors=True)[2]
-    result: Intp = np.where(root >= 0, root, np.arange(len(root))).astype(np.intp)
-    return result
+    return np.where(root >= 0, root, np.arange(len(root))).astype(np.intp)
 
 
 def _closest_triangles(corners: Float64, near: Intp, points: Float64) -> tuple[Intp, Float64, Float64]:
@@ -118,8 +112,7 @@ def _barycentric(triangles: Float64, points: Float64) -> Float64:
 
 
 def _frames(triangles: Float64) -> Float64:
-    """Return (N, 3, 3) an orthonormal frame on each triangle, columns along an edge, across it and
-    upright."""
+    """Return (N, 3, 3) orthonormal frames on triangles, columns along an edge, across it and upright."""
     along = triangles[:, 1] - triangles[:, 0]
     up = np.cross(along, triangles[:, 2] - triangles[:, 0])
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)

@@ -12,11 +12,9 @@ import numpy.typing as npt
 from fba.arrays import Float64, Int32, Intp
 from fba.errors import ModelError
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds, weld_parts
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import FREE_POINTS, names, row_of
 from fba.face.model import Part
 
-FREE_POINTS = ("7.1", "11.5")
-"""Points bound to no vertex: they lie inside the head or above the skin."""
 KINDS_OF_GROUP = {6: ("tongue",)}
 KINDS_OF_POINT = {
     **dict.fromkeys(("3.5", "3.6"), ("eye",)),
@@ -102,8 +100,7 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
 
 
 def _bound_to(vertex: Int32, points: Float64, vertices: Float64, far: dict[str, float]) -> Binding:
-    """Return the binding of points (84, 3) to vertices by number (84,); free ones (-1) stay where they
-    are."""
+    """Return the binding of points (84, 3) to vertices (84,); free points (-1) stay where they are."""
     points = points.copy()
     is_bound = vertex >= 0
     points[is_bound] = vertices[vertex[is_bound]]
@@ -152,8 +149,7 @@ def _connected_pieces(parts: Sequence[Part], kinds: tuple[str, ...]) -> Intp:
 
 
 def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, slack: float) -> int:
-    """Return the nearest vertex in one jaw, among those at most `slack` metres further than the nearest of
-    all.
+    """Return the nearest vertex in one jaw, at most `slack` metres further than the nearest of all.
 
     Teeth touch, so the nearest vertex may be in the wrong jaw. jaw: 1 upper, -1 lower.
     """
@@ -164,11 +160,7 @@ def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, sla
 
 
 def lip_sides(surface: Surface, parts: Sequence[Part], bound: Int32) -> Intp | None:
-    """Return (V,) for the skin's vertices: 1 on the upper edge of the mouth, 2 on the lower, 0 elsewhere, or
-    None.
-
-    None unless the mouth is a slit whose two edges coincide and were joined like a seam.
-    """
+    """Return (V,) 1 and 2 on upper and lower edges of a slit mouth, joined as a seam; None without."""
     left, middle, right = surface.find(bound[[row_of()[name] for name in ("2.4", "2.2", "2.5")]]).tolist()
     if min(left, middle, right) < 0:
         return None

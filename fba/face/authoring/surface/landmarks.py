@@ -55,8 +55,7 @@ class Landmarks:
 
     def point(self, name: str) -> Float64:
         """Return (3,) position of a feature point, metres; NaN where unknown."""
-        position: Float64 = self.points[row_of()[name]]
-        return position
+        return np.asarray(self.points[row_of()[name]])
 
     def has(self, *wanted: str) -> bool:
         """Return whether all these feature points stand on the surface."""
@@ -69,18 +68,15 @@ class Landmarks:
     def step(self, fap: int) -> Float64:
         """Return (3,) displacement, metres, of the point of a FAP by one unit of its value."""
         entry = faps()[fap - 1]
-        step: Float64 = np.array(DIRECTIONS[entry.positive]) * self.fapu[entry.unit]
-        return step
+        return np.array(DIRECTIONS[entry.positive]) * self.fapu[entry.unit]
 
     def missing_point(self, fap: int) -> str:
-        """Return why the surface cannot follow a FAP, if the FAP's feature point is not on it; otherwise
-        empty."""
+        """Return why the surface cannot follow a FAP: its feature point is not on it. Otherwise ""."""
         point = faps()[fap - 1].feature_points[0]
         return "" if self.has(point) else f"feature point {point} is not on the skin"
 
     def contour(self, name: str) -> Intp:
-        """Return the vertices along a contour, corner to corner; empty unless both ends and one point between
-        exist."""
+        """Return the vertices along a contour; empty unless its ends and a point between them exist."""
         if name not in self._contours:
             around = None
             if "outer lip" in name:
@@ -139,10 +135,7 @@ class Landmarks:
 
     @cached_property
     def points_or_average(self) -> Float64:
-        """(84, 3) every feature point, metres; unknown ones as on an average adult head.
-
-        The average is stretched along each axis and moved to fit the known points.
-        """
+        """(84, 3) feature points, metres; unknown ones from an average head, stretched and moved to fit."""
         average = np.array(neutral_points())
         known = np.isfinite(self.points).all(axis=1)
         result = self.points.copy()
@@ -156,8 +149,7 @@ class Landmarks:
 
     def point_or_average(self, name: str) -> Float64:
         """Return (3,) position of a feature point; if unknown, as on an average adult head."""
-        position: Float64 = self.points_or_average[row_of()[name]]
-        return position
+        return np.asarray(self.points_or_average[row_of()[name]])
 
 
 def find_landmarks(surface: Surface, points: Float64, bound: Int32) -> Landmarks:
@@ -171,11 +163,7 @@ def find_landmarks(surface: Surface, points: Float64, bound: Int32) -> Landmarks
 
 
 def weld_skin(parts: Sequence[Part], bound: Int32) -> Surface:
-    """Return skin and inner mouth as one surface; a mouth that is a slit, its edges on each other, stays
-    open.
-
-    bound: (84,), vertices of the feature points counted through all parts, -1 where free.
-    """
+    """Return skin and inner mouth as one surface; edges of a mouth that lie on each other stay apart."""
     surface = weld_parts(parts, SURFACE_KINDS)
     sides = lip_sides(surface, parts, bound)
     return surface if sides is None else weld_parts(parts, SURFACE_KINDS, sides=sides)

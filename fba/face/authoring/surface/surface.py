@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fba.arrays import Bool, Float64, Integer, Intp
 from fba.face.model import PART_KINDS, Part
-from fba.mesh import vertex_normals
+from fba.mesh import connected, vertex_normals
 
 WELD = 1e-6
 """Vertices on open edges this close together, as a share of the surface's extent, are one: a seam."""
@@ -41,11 +41,16 @@ class Surface:
         return len(self.vertices)
 
     def find(self, vertices: Integer) -> Intp:
-        """Return (M,) vertices of the surface that vertices counted through all parts became; -1 for
-        others."""
+        """Return (M,) the surface's vertices for vertices counted through all parts; -1 for others."""
         table = np.full(int(max(self.pool.max(initial=-1), vertices.max(initial=-1))) + 2, -1, dtype=np.intp)
         table[self.pool] = self.number
         return table[vertices]
+
+    def of_all(self, field: Float64) -> Float64:
+        """Return (N, 3) values of the surface's vertices, of those (V, 3) of all vertices of the face."""
+        result = np.zeros((len(self), 3))
+        result[self.number] = field[self.pool]
+        return result
 
     def mask(self, vertices: npt.ArrayLike) -> Bool:
         """Return (N,) mask of the given vertices."""
@@ -66,8 +71,7 @@ class Surface:
     def open_edges(self) -> Intp:
         """(E, 2) each edge of one triangle only."""
         edges, count = self._edge_counts
-        result: Intp = edges[count == 1]
-        return result
+        return np.asarray(edges[count == 1])
 
     @cached_property
     def graph(self) -> Any:
@@ -77,8 +81,7 @@ class Surface:
     def neighbours(self, vertices: Intp) -> Intp:
         """Return the vertices at the other ends of the edges of some vertices (M,), in rising order."""
         positions, _ = positions_in_rows(self.graph.indptr, vertices)
-        found: Intp = np.unique(self.graph.indices[positions])
-        return found
+        return np.unique(self.graph.indices[positions])
 
     @cached_property
     def rim_graph(self) -> Any:
@@ -99,8 +102,7 @@ class Surface:
         """(N,) number of the connected piece that each vertex belongs to."""
         from scipy.sparse.csgraph import connected_components
 
-        labels: Intp = connected_components(self.graph, directed=False)[1]
-        return labels
+        return np.asarray(connected_components(self.graph, directed=False)[1])
 
     @cached_property
     def normals(self) -> Float64:
@@ -120,12 +122,10 @@ class Surface:
         start = np.unique(np.asarray(sources, dtype=np.intp))
         if not len(start):
             return np.full(len(self), np.inf)
-        away: Float64 = dijkstra(self.graph, directed=False, indices=start, limit=limit, min_only=True)
-        return away
+        return np.asarray(dijkstra(self.graph, directed=False, indices=start, limit=limit, min_only=True))
 
     def path(self, start: int, end: int, *, rim: bool = False, costs: Float64 | None = None) -> Intp:
-        """Return the vertices of the shortest path along edges, both ends included; empty if no path joins
-        them.
+        """Return the vertices of the shortest path along edges, with both ends; empty if there is none.
 
         rim: prefer open edges, as of a mouth that is a slit or eyes that are holes. costs: (N,), factors of
         the lengths of edges at each vertex, 1 or more; the larger one of both ends counts.
@@ -141,11 +141,7 @@ class Surface:
             graph = csr_array((graph.data * np.maximum(costs[a], costs[b]), (a, b)), shape=graph.shape)
         for limit in (3 * away + 1e-9, np.inf):
             length, before = dijkstra(
-                graph,
-                directed=False,
-                indices=start,
-                limit=limit,
-                return_predecessors=True,
+                graph, directed=False, indices=start, limit=limit, return_predecessors=True
             )
             if np.isfinite(length[end]):
                 break
@@ -201,10 +197,7 @@ def vertices_of_kinds(parts: Sequence[Part], kinds: Sequence[str]) -> Intp:
 def weld_parts(
     parts: Sequence[Part], kinds: Sequence[str] = PART_KINDS, *, sides: Intp | None = None
 ) -> Surface:
-    """Return the parts of some kinds as one surface, open edges that coincide joined.
-
-    sides: (V,), vertices of different sides stay apart.
-    """
+    """Return parts as one surface, coinciding open edges joined but for vertices of other `sides` (V,)."""
     pool = vertices_of_kinds(parts, kinds)
     welded = [part for part in parts if part.kind in kinds]
     vertices = np.concatenate([part.vertices for part in welded]).astype(np.float64)
@@ -245,8 +238,7 @@ def positions_in_rows(starts: Integer, rows: Intp) -> tuple[Intp, Intp]:
 
 
 def _count_edges(triangles: Intp) -> tuple[Intp, Intp]:
-    """Return ((E, 2) each edge once, lower vertex first, in rising order; (E,) how many triangles share
-    it)."""
+    """Return (E, 2) each edge once, lower vertex first, rising, and (E,) how many triangles share it."""
     sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     size = int(sides.max(initial=0)) + 1
     # One number an edge: rows of two numbers take np.unique thirty times as long.
@@ -256,8 +248,6 @@ def _count_edges(triangles: Intp) -> tuple[Intp, Intp]:
 
 def _join_seams(vertices: Float64, triangles: Intp, sides: Intp | None) -> Intp:
     """Return (N,) for each vertex the lowest number of those that it is joined with."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     edges, count = _count_edges(triangles)
@@ -269,9 +259,7 @@ def _join_seams(vertices: Float64, triangles: Intp, sides: Intp | None) -> Intp:
     pairs = cKDTree(vertices[rim]).query_pairs(WELD * extent, output_type="ndarray")
     if sides is not None:
         pairs = pairs[sides[rim[pairs[:, 0]]] == sides[rim[pairs[:, 1]]]]
-    shape = (len(rim), len(rim))
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=shape)
-    labels = connected_components(graph, directed=False)[1]
+    labels = connected(pairs, len(rim))
     lowest = np.full(labels.max() + 1, len(vertices))
     np.minimum.at(lowest, labels, rim)
     first[rim] = lowest[labels]

@@ -1,4 +1,1 @@
-"""Pieces of an imported mesh put together to a face model: kinds of parts, units, landmarks, materials.
-
-May use: meshes, authoring, the face model.
-"""
+"""Pieces of an imported mesh put together to a face model: kinds of parts, units, landmarks, materials."""

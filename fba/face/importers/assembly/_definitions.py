@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
@@ -19,6 +17,7 @@ from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.points import DIRECTIONS, OPEN_JAW
 from fba.parameters import FAP_COUNT, faps
+from fba.text_files import packaged_rows
 
 MOUTH = (OPEN_JAW, *range(4, 14), 16, 17, *range(51, 61))
 """FAPs by which a viseme is shown."""
@@ -83,8 +82,7 @@ def named_shapes(names: Iterable[str]) -> dict[tuple[str, int], str]:
 def _measure(
     model: FaceModel, deform: Deformer, shape: Mapping[str, Floating], numbers: tuple[int, ...]
 ) -> Float64 | None:
-    """Return (68,) values of some FAPs that move their points as a shape does; None where it moves hardly
-    any."""
+    """Return (68,) values of FAPs that move their points as a shape does; None if it moves hardly any."""
     apart = model.fapu.ES * 1024
     moved = np.full((len(model.points), 3), np.nan)
     for part, field in shape.items():
@@ -146,12 +144,11 @@ def _within_limits(values: Float64) -> Float64:
 
 @cache
 def _synonyms() -> dict[frozenset[str], tuple[str, int]]:
-    with (files(__package__) / "visemes.csv").open(encoding="utf-8") as file:
-        return {
-            _words(name): (row["kind"], int(row["select"]))
-            for row in csv.DictReader(file)
-            for name in row["names"].split(";")
-        }
+    return {
+        _words(name): (row["kind"], int(row["select"]))
+        for row in packaged_rows(__package__, "visemes.csv")
+        for name in row["names"].split(";")
+    }
 
 
 def _words(name: str) -> frozenset[str]:

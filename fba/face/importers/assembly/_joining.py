@@ -122,7 +122,9 @@ def make_atlas(parts: Sequence[Part]) -> Atlas | None:
     for texture in textures:
         own = [part.texcoords for part in parts if part.material.texture == texture]
         coords = [each for each in own if each is not None and len(each)]
-        tile = _plain_tile() if texture is None else _tile(texture, coords, most)
+        white = np.full((PLAIN_PIXELS, PLAIN_PIXELS, 4), 255, dtype=np.uint8)
+        plain = _Tile(np.zeros(2), np.ones(2), white)
+        tile = plain if texture is None else _tile(texture, coords, most)
         if tile is None:
             return None
         tiles.append(tile)
@@ -151,16 +153,8 @@ def make_atlas(parts: Sequence[Part]) -> Atlas | None:
     return Atlas(_encode(picture), tuple(texcoords))
 
 
-def _plain_tile() -> _Tile:
-    """Return a white tile."""
-    return _Tile(np.zeros(2), np.ones(2), np.full((PLAIN_PIXELS, PLAIN_PIXELS, 4), 255, dtype=np.uint8))
-
-
 def _tile(texture: bytes, texcoords: Sequence[Float32], most: int) -> _Tile | None:
-    """Return what texture coordinates, arrays (V, 2), show of a texture, at most `most` pixels wide and high.
-
-    None where that cannot be cut out.
-    """
+    """Return what texture coordinates show of a texture, at most `most` pixels wide and high, or None."""
     if not texcoords or most < PLAIN_PIXELS:
         return None
     low = np.min([each.min(axis=0) for each in texcoords], axis=0).astype(np.float64)

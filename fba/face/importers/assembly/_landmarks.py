@@ -9,6 +9,7 @@ moved onto the skin.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,9 +19,13 @@ from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, flat_width, sphere
 from fba.face.feature_points import row_of
-from fba.face.importers.assembly._openings import find_eye_loop, lid_points_of_loop, mouth_points
+from fba.face.importers.assembly._outlines import (
+    find_eye_loop,
+    lid_points_of_loop,
+    mouth_points,
+    profile_points,
+)
 from fba.face.importers.assembly._polygon_parts import Piece
-from fba.face.importers.assembly._profile import profile_points
 from fba.face.importers.assembly._symmetry import mirror_points
 from fba.face.importers.assembly._warping import warp_points
 from fba.face.model import Part
@@ -54,8 +59,18 @@ RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
 """Points of the right lids' margins and of the corners between them."""
 MAX_OPENING_DIFFERENCE = 0.02
 """Share by which the heights of both eyes' openings differ, at most, where lids stay as located."""
+EYE_CORNERS = {"left": ("3.7", "3.11"), "right": ("3.8", "3.12")}
+"""Left and right corner of each eye."""
 MIN_FAPS = 20
 """With at least this many shapes named after FAPs, points are where these move most."""
+
+
+class Eye(NamedTuple):
+    """The sphere and the pupil of an eye."""
+
+    centre: Float64
+    radius: float
+    pupil: Float64
 
 
 def find_points(
@@ -79,12 +94,12 @@ def find_points(
     else:
         points = _from_arkit(pieces, skin[0], vertices, eyes, path)
     for side, name in PUPIL_POINT.items():
-        points[name] = eyes[side][2]
+        points[name] = eyes[side].pupil
     points |= profile_points(skin[0].part, points)
     points |= _tongue(pieces, points) | _teeth(pieces, points)
     if not symmetric:
         return warp_points(pieces, points)
-    middle = float(eyes["left"][0][0] + eyes["right"][0][0]) / 2
+    middle = float(eyes["left"].centre[0] + eyes["right"].centre[0]) / 2
     own = () if exactly or not _open_alike(points) else tuple(name for name in RIGHT_LID if name in points)
     return warp_points(pieces, mirror_points(points, middle, own), symmetric=True, own=own)
 
@@ -121,8 +136,7 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
 
 
 def _tongue(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str, Float64]:
-    """Return the tip, middle and borders of a tongue; the last a third of the pupils' distance behind the
-    tip."""
+    """Return a tongue's tip, and its middle and borders a third of the pupils' distance behind that."""
     tongues = [piece.part.vertices for piece in pieces if piece.part.kind == "tongue"]
     if not tongues:
         return {}
@@ -156,8 +170,8 @@ def _teeth(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str,
     return points
 
 
-def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, float, Float64]]:
-    """Return the centre, radius and pupil of the left and right eyeball."""
+def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, Eye]:
+    """Return the left and the right eye."""
     eyes = {}
     for piece in pieces:
         if piece.part.kind == "eye":
@@ -168,17 +182,15 @@ def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, tuple[Float64, fl
                 middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
                 pupil = vertices[int(np.linalg.norm((vertices - middle)[:, :2], axis=1).argmin())]
                 radius = EYEBALL_PER_IRIS * width
-                eyes[side] = (pupil - (0.0, 0.0, radius), radius, pupil)
+                eyes[side] = Eye(pupil - (0.0, 0.0, radius), radius, pupil)
             elif (ball := sphere(piece.part)) is not None:
                 centre, radius = ball[0], ball[1]
                 away = np.hypot(vertices[:, 0] - centre[0], vertices[:, 1] - centre[1])
                 ahead = vertices[:, 2] - centre[2]
                 # the flat back of half a ball has a vertex on the axis, too
-                away[
-                    ahead
-                    < (MIN_PUPIL_DISTANCE * radius if ahead.max() > MIN_PUPIL_DISTANCE * radius else 0.0)
-                ] = np.inf
-                eyes[side] = (centre, radius, vertices[int(away.argmin())])
+                least = MIN_PUPIL_DISTANCE * radius
+                away[ahead < (least if ahead.max() > least else 0.0)] = np.inf
+                eyes[side] = Eye(centre, radius, vertices[int(away.argmin())])
     missing = [f"the {side} eye" for side in ("left", "right") if side not in eyes]
     if missing:
         raise ModelError(
@@ -211,11 +223,7 @@ def _from_faps(vertices: Float64, by_fap: Mapping[int, Float32]) -> dict[str, Fl
 
 
 def _from_arkit(
-    pieces: Sequence[Piece],
-    skin: Piece,
-    vertices: Float64,
-    eyes: Mapping[str, tuple[Float64, float, Float64]],
-    path: str,
+    pieces: Sequence[Piece], skin: Piece, vertices: Float64, eyes: Mapping[str, Eye], path: str
 ) -> dict[str, Float64]:
     """Return the points of the lids and the mouth, by shapes named as ARKit's."""
     moving = [name for name, morph in skin.morphs.items() if np.abs(morph).max(initial=0.0) > 0]
@@ -237,11 +245,8 @@ def _from_arkit(
     return points | _mouth(skin.part, facing, shapes, eyes, path)
 
 
-def _lids(
-    vertices: Float64, blink: Float64, eye: tuple[Float64, float, Float64], side: str
-) -> dict[str, Float64]:
-    """Return the middles of the lids' margins, what a blink lowers most and what it then meets, and their
-    corners."""
+def _lids(vertices: Float64, blink: Float64, eye: Eye, side: str) -> dict[str, Float64]:
+    """Return the lid margins' middles, what a blink lowers most and what it meets, and their corners."""
     centre, radius, _ = eye
     distance = np.linalg.norm(vertices - centre, axis=1)
     near = distance < 1.3 * radius
@@ -267,8 +272,7 @@ def _lids(
     # the corners are the outermost vertices that a blink moves
     size = np.linalg.norm(blink, axis=1)
     taken = near & (vertices[:, 2] > centre[2]) & (size > 0.1 * size[upper])
-    corners = ("3.7", "3.11") if side == "left" else ("3.8", "3.12")
-    for corner, way in zip(corners, (1.0, -1.0), strict=True):
+    for corner, way in zip(EYE_CORNERS[side], (1.0, -1.0), strict=True):
         points[corner] = vertices[int(np.where(taken, way * vertices[:, 0], -np.inf).argmax())]
     opening = vertices[upper, 1] - vertices[lower, 1]
     if not opening > 0:
@@ -276,38 +280,25 @@ def _lids(
     return points
 
 
-def _lids_by_loops(
-    pieces: Sequence[Piece], eyes: Mapping[str, tuple[Float64, float, Float64]]
-) -> dict[str, Float64]:
+def _lids_by_loops(pieces: Sequence[Piece], eyes: Mapping[str, Eye]) -> dict[str, Float64]:
     """Return the middles of the lids and corners of the eyes, on the loops of edges around their openings."""
     surface = weld_parts([piece.part for piece in pieces], SURFACE_KINDS)
     points: dict[str, Float64] = {}
     for side, (centre, radius, pupil) in eyes.items():
         loop = find_eye_loop(surface, centre, radius)
-        found = (
-            lid_points_of_loop(surface.vertices, loop, float(pupil[0]))
-            if len(loop) >= MIN_LOOP_VERTICES
-            else {}
-        )
-        if found:
-            upper, lower = LID_POINTS[side]
-            left, right = ("3.7", "3.11") if side == "left" else ("3.8", "3.12")
-            names = {"upper": upper, "lower": lower, "left": left, "right": right}
-            points |= {names[where]: surface.vertices[vertex] for where, vertex in found.items()}
+        if len(loop) >= MIN_LOOP_VERTICES:
+            found = lid_points_of_loop(surface.vertices, loop, float(pupil[0]))
+            named = zip(LID_POINTS[side] + EYE_CORNERS[side], found, strict=False)
+            points |= {name: surface.vertices[vertex] for name, vertex in named}
     return points
 
 
 def _mouth(
-    skin: Part,
-    facing: Bool,
-    shapes: Mapping[str, Float64],
-    eyes: Mapping[str, tuple[Float64, float, Float64]],
-    path: str,
+    skin: Part, facing: Bool, shapes: Mapping[str, Float64], eyes: Mapping[str, Eye], path: str
 ) -> dict[str, Float64]:
-    """Return the middles of the lips, corners of the mouth, and points between. facing: vertices that face
-    forwards."""
+    """Return lip middles, mouth corners, and points between. facing: vertices that face forwards."""
     vertices = skin.vertices.astype(np.float64)
-    left, right = eyes["left"][0], eyes["right"][0]
+    left, right = eyes["left"].centre, eyes["right"].centre
     apart = left[0] - right[0]
     if not apart > 0:
         raise ModelError(
@@ -390,8 +381,7 @@ def _end_of_slit(
 def _lip_pair(
     vertices: Float64, drop: Float64, ahead: Bool, x: float, apart: float
 ) -> tuple[int, int] | None:
-    """Return the upper and lower lip at some x: vertices close together that an opening jaw parts the
-    furthest."""
+    """Return the upper and lower lip at some x: close vertices that an opening jaw parts furthest."""
     column = np.flatnonzero((np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead)
     if not len(column) or not drop[column].max() > 0:
         return None

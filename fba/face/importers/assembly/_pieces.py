@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +17,10 @@ from fba.face.importers.assembly._joining import join_pieces
 from fba.face.importers.assembly._polygon_parts import Piece, vertex_components
 from fba.face.model import PART_KINDS
 from fba.mesh import UniqueNames
+from fba.text_files import packaged_rows
 
 DROPPED = "none"
 """Kind of parts that are left out: transparent shells in front of the eye, which would hide it."""
-FREE_POINTS = ("7.1", "11.5")
-"""Feature points that stand on no surface."""
 EYE_ROUND = 0.1
 """Root mean square distance of an eyeball's vertices from their sphere, by its radius."""
 MIN_SINGLE_TEETH = 6
@@ -47,8 +44,7 @@ EYE_SIZES = (0.02, 0.12)
 def assemble(
     pieces: Sequence[Piece], kinds: Mapping[str, str] | None = None, *, middle: float | None = None
 ) -> tuple[Piece, ...]:
-    """Return the parts of a face: kinds from names, all skin in one, each eyeball in one, teeth upper and
-    lower.
+    """Return a face's parts: kinds from names, all skin in one, each eyeball in one, two rows of teeth.
 
     kinds: what the user says, by the name of a group, object, mesh or material. middle: the x of the
     plane between left and right, by default between the eyes. Where names do not say, round shells in pairs
@@ -118,6 +114,19 @@ def shift_piece(piece: Piece, scale: float, shift: npt.ArrayLike) -> Piece:
     return replace(piece, part=part, morphs={name: m * np.float32(scale) for name, m in piece.morphs.items()})
 
 
+def turn_pieces(pieces: Sequence[Piece], turn: Float64, about: Float64 | None = None) -> list[Piece]:
+    """Return the pieces turned by a matrix (3, 3), about a point (3,) or the origin."""
+    result = []
+    for piece in pieces:
+        part = piece.part
+        placed = part.vertices @ turn.T if about is None else (part.vertices - about) @ turn.T + about
+        normals = None if part.normals is None else (part.normals @ turn.T).astype(np.float32)
+        part = replace(part, vertices=placed.astype(np.float32), normals=normals)
+        morphs = {name: (morph @ turn.T).astype(np.float32) for name, morph in piece.morphs.items()}
+        result.append(replace(piece, part=part, morphs=morphs))
+    return result
+
+
 def _with_eyes(
     pieces: Sequence[Piece], kinds: Mapping[int, str | None], middle: float | None
 ) -> list[tuple[Piece, str | None]]:
@@ -132,10 +141,7 @@ def _with_eyes(
     heights = np.concatenate([piece.part.vertices[:, 1] for piece in pieces])
     tall = max(float(np.ptp(heights)), 1e-9)
     spheres: list[tuple[int, int, Float64, float]] = []
-    labels = [
-        vertex_components(piece.part.triangles, len(piece.part.vertices), piece.part.vertices)
-        for piece in pieces
-    ]
+    labels = [vertex_components(piece.part.triangles, piece.part.vertices) for piece in pieces]
     for number, (piece, label) in enumerate(zip(pieces, labels, strict=True)):
         sizes = np.bincount(label)
         for shell in np.flatnonzero((sizes >= 20) & (sizes < len(heights) / 2))[:500]:
@@ -166,8 +172,7 @@ def _with_eyes(
 
 
 def _is_set_in(vertices: Float32, centre: Float64, radius: float) -> bool:
-    """Return whether vertices (N, 3) lie around a ball on most sides, as lids do, but none around a bun of
-    hair."""
+    """Return whether vertices (N, 3) lie around a ball on most sides, as lids do; a bun of hair has none."""
     x, y, z = ((vertices - centre) / radius).T
     far = np.hypot(x, y)
     near = (far > LID_RADII[0]) & (far < LID_RADII[1]) & (np.abs(z) < LID_RADII[1])
@@ -176,8 +181,7 @@ def _is_set_in(vertices: Float32, centre: Float64, radius: float) -> bool:
 
 
 def _join_by_kind(pieces: Sequence[tuple[Piece, str]], middle: float) -> tuple[Piece, ...]:
-    """Return one piece each for skin, eyes, brows, lashes, rows of teeth, tongue and mouth; others as they
-    are."""
+    """Return one piece for each side or row of skin, eyes, brows, lashes and mouth; others as they are."""
     result: list[Piece] = []
 
     def add(kind: str, name: str, own: Sequence[Piece]) -> None:
@@ -218,7 +222,7 @@ def _are_one_row(teeth: Sequence[Piece]) -> bool:
     lows, highs, fronts = [], [], []
     for piece in teeth:
         vertices = piece.part.vertices
-        label = vertex_components(piece.part.triangles, len(vertices), vertices)
+        label = vertex_components(piece.part.triangles, vertices)
         for shell in range(int(label.max()) + 1):
             own = vertices[label == shell]
             lows.append(float(own[:, 1].min()))
@@ -233,14 +237,11 @@ def _are_one_row(teeth: Sequence[Piece]) -> bool:
 
 
 def _side(pieces: Sequence[Piece], wanted: Callable[[Float64], Bool]) -> list[Piece]:
-    """Return the components of each piece whose centre lies on the wanted side.
-
-    wanted: takes centres (N, 3), returns bool (N,).
-    """
+    """Return the components whose centres (N, 3) are `wanted` (bool (N,)), of each piece."""
     result = []
     for piece in pieces:
         vertices = piece.part.vertices
-        label = vertex_components(piece.part.triangles, len(vertices), vertices)
+        label = vertex_components(piece.part.triangles, vertices)
         order = np.argsort(label, kind="stable")
         starts = np.flatnonzero(np.diff(label[order], prepend=-1))
         ordered = vertices[order].astype(np.float64)
@@ -278,8 +279,7 @@ def part_names(taken: Iterable[str] = ()) -> UniqueNames:
 
 @cache
 def _words() -> tuple[tuple[str, str], ...]:
-    with (files(__package__) / "kinds.csv").open(encoding="utf-8") as file:
-        return tuple((row["word"], row["kind"]) for row in csv.DictReader(file))
+    return tuple((row["word"], row["kind"]) for row in packaged_rows(__package__, "kinds.csv"))
 
 
 def guess_kind(*names: str) -> str | None:
@@ -298,8 +298,7 @@ def guess_kind(*names: str) -> str | None:
 
 
 def kind_of(piece: Piece, given: Mapping[str, str]) -> str | None:
-    """Return the kind of a piece that a user gave by its name or material, else that of its names, or
-    None."""
+    """Return the kind that a user gave by a piece's name or material, else that of its names, or None."""
     kind = given.get(piece.part.name, given.get(piece.material))
     return guess_kind(piece.part.name, piece.material) if kind is None else kind
 

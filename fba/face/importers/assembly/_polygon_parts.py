@@ -1,16 +1,38 @@
-"""Pieces of a mesh file, made of its polygons; connected components of a mesh."""
+"""Pieces of a mesh file, made of its polygons; connected components of a mesh; default materials.
+
+Parts without colours get these: skin, teeth, tongue, eyes with an iris.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fba.arrays import Bool, Float32, Int32, Integer, Intp
+from fba.arrays import Bool, Float32, Float64, Int32, Intp
 from fba.errors import ModelError
+from fba.face.eyeball import LID_POINTS, PUPIL_POINT, sphere
+from fba.face.feature_points import row_of
 from fba.face.model import Material, Part
-from fba.mesh import Polygons, triangulate, vertex_normals
+from fba.mesh import Polygons, connected, triangulate, vertex_normals
+
+LOOKS = {
+    "skin": Material("skin", (0.71, 0.47, 0.36), 0.55),
+    "mouth": Material("mouth", (0.35, 0.10, 0.09), 0.4),
+    "teeth": Material("teeth", (0.83, 0.80, 0.72), 0.25),
+    "tongue": Material("tongue", (0.55, 0.16, 0.15), 0.4),
+    "brow": Material("brow", (0.06, 0.04, 0.03), 0.8),
+    "lash": Material("lashes", (0.02, 0.015, 0.01), 0.8),
+    "hair": Material("hair", (0.06, 0.04, 0.03), 0.6),
+    "eye": Material("eye", (0.80, 0.78, 0.75), 0.1),
+}
+"""Materials by kind of part."""
+WHITE = (0.80, 0.78, 0.75)
+IRIS = (0.16, 0.09, 0.05)
+PUPIL = (0.004, 0.004, 0.004)
+MAX_GREY_DIFFERENCE = 0.03
+"""Light colours whose channels differ by less are programs' defaults, and are replaced."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,29 +96,56 @@ def make_piece(
 
 
 def polygon_components(polygons: Polygons) -> tuple[Intp, Intp]:
-    """Return the connected component of each vertex, (V,), and of each polygon, (F,), by lowest vertex
-    number."""
+    """Return the connected component of each vertex, (V,), and polygon, (F,), by lowest vertex."""
     sizes = np.diff(polygons.starts)
     first = np.repeat(polygons.corners[polygons.starts[:-1]], sizes)
-    label = _connected(first, polygons.corners, len(polygons.vertices))
+    label = connected(np.stack([first, polygons.corners], axis=1), len(polygons.vertices))
     return label, label[polygons.corners[polygons.starts[:-1]]]
 
 
-def vertex_components(triangles: Int32, count: int, vertices: Float32) -> Intp:
-    """Return (count,) connected component of each vertex; vertices at one position (texture seams) count as
-    one."""
+def vertex_components(triangles: Int32, vertices: Float32) -> Intp:
+    """Return (V,) connected component of each vertex; those at one position (seams) count as one."""
     _, same = np.unique(vertices, axis=0, return_inverse=True)
     position = same.reshape(-1)
-    a, b, c = position[triangles].T if len(triangles) else (position[:0],) * 3
-    label = _connected(np.concatenate([a, b]), np.concatenate([b, c]), int(position.max()) + 1)
+    corners = position[triangles]
+    label = connected(np.concatenate([corners[:, :2], corners[:, 1:]]), int(position.max()) + 1)
     return np.asarray(label[position], dtype=np.intp)
 
 
-def _connected(a: Integer, b: Integer, count: int) -> Intp:
-    """Return (count,) component of each vertex, for edges between vertices a (E,) and b (E,)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+def apply_default_materials(pieces: Sequence[Piece], points: Float64) -> list[Piece]:
+    """Return the pieces with default materials where they lack looks. points: (84, 3), for irises."""
+    result = []
+    for piece in pieces:
+        part = piece.part
+        if part.material.texture is None and part.colours is None and _is_grey(part.material):
+            material = LOOKS.get(part.kind, part.material)
+            part = replace(part, material=material)
+            if part.kind == "eye":
+                part = _with_iris(part, points)
+        result.append(replace(piece, part=part))
+    return result
 
-    links = (np.ones(len(a), dtype=np.int8), (a, b))
-    labels: Intp = connected_components(coo_array(links, shape=(count, count)), directed=False)[1]
-    return labels
+
+def _is_grey(material: Material) -> bool:
+    return max(material.colour) - min(material.colour) < MAX_GREY_DIFFERENCE and min(material.colour) > 0.5
+
+
+def _with_iris(part: Part, points: Float64) -> Part:
+    """Return the eye with a neutral iris: as wide as the lids are apart, its pupil a third of it."""
+    side = "left" if "left" in part.name else "right"
+    pupil = points[row_of()[PUPIL_POINT[side]]]
+    upper, lower = (float(points[row_of()[name], 1]) for name in LID_POINTS[side])
+    wide = upper - lower
+    ball = sphere(part)
+    if ball is None or not np.isfinite(pupil).all() or not wide > 0:
+        return part
+    arm = pupil - ball[0]
+    way = arm / max(float(np.linalg.norm(arm)), 1e-9)
+    away = part.vertices - ball[0]
+    along = away @ way
+    off = np.linalg.norm(away - np.outer(along, way), axis=1)
+    colours = np.tile(np.array([*WHITE, 0.9], dtype=np.float32), (len(part.vertices), 1))
+    front = along > 0
+    colours[front & (off < wide / 2), :3] = IRIS
+    colours[front & (off < wide / 6), :3] = PUPIL
+    return replace(part, colours=colours)

@@ -10,7 +10,7 @@ from fba.easing import smoothstep
 from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.authoring.regions._eye_opening import LIDS
 from fba.face.authoring.regions._eyes import PUPIL_OF_IRIS
-from fba.face.checks._fap_checks import check_posed, region_table
+from fba.face.checks._fap_checks import count_errors, region_table
 from fba.face.checks._posing import Poser
 from fba.face.eyeball import PUPIL_FAP, eyeballs, pupil_diameter
 from fba.face.feature_points import row_of
@@ -77,11 +77,9 @@ def drop_false_pupils(model: FaceModel) -> FaceModel:
 
 
 def _count_errors(poser: Poser, fap: int) -> int:
-    """Return the errors of one FAP; of a lid, with the other of its eye: one that stops early does not close
-    it."""
+    """Return the errors of one FAP; of a lid, together with the other of its eye, which it must meet."""
     pair = [each for each, (side, _) in LIDS.items() if fap in LIDS and side == LIDS[fap][0]] or [fap]
-    found = check_posed(poser, pair, combined=len(pair) > 1)
-    return sum(finding.severity == "error" for finding in found)
+    return count_errors(poser, pair, combined=len(pair) > 1)
 
 
 def _candidates(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.face._tables import FaceDefMesh, FaceDefTables
-from fba.face.checks._fap_checks import check_posed
+from fba.face.checks._fap_checks import count_errors
 from fba.face.checks._posing import Poser
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MATES, MIRRORED, row_of
+from fba.face.importers.assembly._pieces import turn_pieces
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import FaceModel
 from fba.parameters import faps
@@ -24,7 +24,7 @@ MIRRORED_TABLES = 0.006
 """Below this asymmetry, tables are mirrored, too, except those of the lids."""
 MIRRORED_LIDS = 0.003
 """Below this asymmetry, the tables of the lids are mirrored, too."""
-LIDS = ((19, 20), (21, 22))
+LID_PAIRS = ((19, 20), (21, 22))
 """FAPs of the lids, left and right: their rows of vertices are the first that differ."""
 MAX_REMAINING_SHARE = 0.5
 """A head is turned if this share of the distances from the mirror image remains at most."""
@@ -61,12 +61,11 @@ def stand_upright(
     )
     if after > MAX_REMAINING_SHARE * before or after > MIRRORED_POINTS * float(np.linalg.norm(left - right)):
         return list(pieces), 0.0
-    return _turned(pieces, between(normal, np.eye(3)[0]), middle), angle
+    return turn_pieces(pieces, between(normal, np.eye(3)[0]), middle), angle
 
 
 def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[list[Piece], Float64, float]:
-    """Return (pieces and their feature points (84, 3) turned so that both sides are level, the angle in
-    radians).
+    """Return pieces and feature points (84, 3) turned so that both sides are level, and the angle, radians.
 
     The angle is 0 where nothing was turned: where points of both sides say nothing, or not the same.
     """
@@ -85,27 +84,11 @@ def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[l
     if not POINT_ANGLES[0] < angle < POINT_ANGLES[1] or after > MAX_REMAINING_SHARE * before:
         return list(pieces), points, 0.0
     turn, middle = between(normal, np.eye(3)[0]), pairs.mean(axis=(0, 1))
-    return _turned(pieces, turn, middle), (points - middle) @ turn.T + middle, angle
-
-
-def _turned(pieces: Sequence[Piece], turn: Float64, middle: Float64) -> list[Piece]:
-    """Return the pieces turned by a matrix (3, 3) about a point."""
-    result = []
-    for piece in pieces:
-        part = piece.part
-        placed = (part.vertices - middle) @ turn.T + middle
-        normals = None if part.normals is None else (part.normals @ turn.T).astype(np.float32)
-        part = replace(part, vertices=placed.astype(np.float32), normals=normals)
-        morphs = {name: (morph @ turn.T).astype(np.float32) for name, morph in piece.morphs.items()}
-        result.append(replace(piece, part=part, morphs=morphs))
-    return result
+    return turn_pieces(pieces, turn, middle), (points - middle) @ turn.T + middle, angle
 
 
 def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
-    """Return the 98th percentile of the skin's distances from its mirror image, by the distance of the eyes.
-
-    left, right: (3,) centres of the eyes.
-    """
+    """Return the 98th percentile of the skin's distances from its mirror image, by that of the eyes (3,)."""
     vertices = _face(pieces, left, right)
     if len(vertices) < 4:
         return np.inf
@@ -114,20 +97,18 @@ def asymmetry(pieces: Sequence[Piece], left: Float64, right: Float64) -> float:
 
 
 def mirror_points(points: dict[str, Float64], middle: float, own: Collection[str] = ()) -> dict[str, Float64]:
-    """Return the located points with those of the right side, and those of the midline, from the left and the
-    middle.
+    """Return the located points; the left ones give those of the right side, and the midline is centred.
 
     middle: the x of the plane of symmetry. own: points of the right side that stay where they were located.
     """
     result = dict(points)
-    sides = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
     for name, position in points.items():
         if name in MIRRORED and MIRRORED[name] not in own:
             result[MIRRORED[name]] = position * (-1.0, 1.0, 1.0) + (2 * middle, 0.0, 0.0)
-        elif name not in sides:
+        elif name not in MATES:
             result[name] = np.array([middle, *position[1:]])
-        elif sides[name] not in points:  # only the right one was found
-            result[sides[name]] = position * (-1.0, 1.0, 1.0) + (2 * middle, 0.0, 0.0)
+        elif MATES[name] not in points:  # only the right one was found
+            result[MATES[name]] = position * (-1.0, 1.0, 1.0) + (2 * middle, 0.0, 0.0)
     return result
 
 
@@ -139,7 +120,7 @@ def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
     other = _counterparts(model)
     pairs = [(fap.number, fap.left_right_mate) for fap in faps() if fap.left_right_mate is not None]
     if not lids:
-        pairs = [pair for pair in pairs if pair not in LIDS and pair[::-1] not in LIDS]
+        pairs = [pair for pair in pairs if pair not in LID_PAIRS and pair[::-1] not in LID_PAIRS]
     reach = [
         sum(
             _reach(model.table_of[pair[side]])
@@ -163,28 +144,20 @@ def mirror_tables(model: FaceModel, *, lids: bool = True) -> FaceModel:
 
 
 def mirror_faulty_lids(model: FaceModel) -> FaceModel:
-    """Return the model; where the lids of one eye break more rules than those of the other, these are
-    mirrored.
-
-    That is undone where the mirror images break as many.
-    """
+    """Return the model, faulty lids of one eye replaced by mirror images of the other's if that helps."""
     poser = Poser(model)
-    errors = [_count_errors(poser, [pair[side] for pair in LIDS]) for side in (0, 1)]
+    errors = [count_errors(poser, [pair[side] for pair in LID_PAIRS]) for side in (0, 1)]
     if errors[0] == errors[1]:
         return model
     bad = int(errors[1] > errors[0])
     other = _counterparts(model)
     tables = dict(model.table_of)
-    for pair in LIDS:
+    for pair in LID_PAIRS:
         if pair[1 - bad] in tables and pair[bad] in tables:
             tables[pair[bad]] = _mirrored(model, tables[pair[1 - bad]], pair[bad], other)
     mirrored = model.with_tables(tuple(tables.values()), model.lost)
-    found = _count_errors(Poser(mirrored, like=poser), [pair[bad] for pair in LIDS])
+    found = count_errors(Poser(mirrored, like=poser), [pair[bad] for pair in LID_PAIRS])
     return mirrored if found < errors[bad] else model
-
-
-def _count_errors(poser: Poser, lids: list[int]) -> int:
-    return sum(finding.severity == "error" for finding in check_posed(poser, lids))
 
 
 def _face(pieces: Sequence[Piece], left: Float64, right: Float64) -> Float64:
@@ -202,8 +175,7 @@ def _mirror_distances(vertices: Float64, middle: Float64, normal: Float64) -> Fl
     from scipy.spatial import cKDTree
 
     mirrored = vertices - 2 * ((vertices - middle) @ normal)[:, None] * normal
-    distances: Float64 = cKDTree(vertices).query(mirrored)[0]
-    return distances
+    return np.asarray(cKDTree(vertices).query(mirrored)[0])
 
 
 def _counterparts(model: FaceModel) -> Intp:

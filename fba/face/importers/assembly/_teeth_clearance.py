@@ -17,7 +17,7 @@ from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.authoring.surface._motion import UNMOVED_DISTANCE
 from fba.face.authoring.surface.landmarks import weld_skin
 from fba.face.authoring.surface.surface import Surface
-from fba.face.checks._fap_checks import check_posed
+from fba.face.checks._fap_checks import count_errors
 from fba.face.checks._posing import Poser
 from fba.face.model import FaceModel
 from fba.parameters import faps
@@ -83,19 +83,15 @@ def clear_teeth(model: FaceModel) -> FaceModel:
     surface = weld_skin(model.parts, model.bound)
     poser = Poser(model)
     motions = [_shifts(poser, surface, stretch, value) for value in KNOTS[1:]]
-    before = _count_errors(poser, stretch)
+    before = count_errors(poser, stretch)
     for slope, share in TRIALS:
         pushes = [share * _push(surface, arch, motion, slope) for motion in motions]
         if max(float(push.max()) for push in pushes) < MIN_OVERLAP:
             return model
         cleared = _with_pushes(model, surface, poser, stretch, pushes)
-        if _count_errors(Poser(cleared, like=poser), stretch) <= before:
+        if count_errors(Poser(cleared, like=poser), stretch) <= before:
             return cleared
     return model.with_notes({"teeth": "they come through the skin beside a narrow mouth"})
-
-
-def _count_errors(poser: Poser, stretch: list[int]) -> int:
-    return sum(finding.severity == "error" for finding in check_posed(poser, stretch))
 
 
 def _with_pushes(
@@ -141,9 +137,7 @@ def _measure_arch(model: FaceModel) -> Arch | None:
 
 def _shifts(poser: Poser, surface: Surface, stretch: list[int], value: float) -> Float64:
     """Return (N, 3) displacements of the surface by some FAPs at one value."""
-    shifts = np.zeros((len(surface), 3))
-    shifts[surface.number] = poser.shift(dict.fromkeys(stretch, value))[surface.pool]
-    return shifts
+    return surface.of_all(poser.shift(dict.fromkeys(stretch, value)))
 
 
 def _push(surface: Surface, arch: Arch, shifts: Float64, slope: float) -> Float64:
@@ -211,7 +205,7 @@ def _with_push(
     model: FaceModel, table: FaceDefTables, push: Mapping[float, Float64], surface: Surface
 ) -> FaceDefTables:
     """Return the table of a FAP with a forward motion of the surface, (N,) metres by value."""
-    unit = model.fapu[faps()[table.fap - 1].unit]
+    unit = model.fapu.of_fap(table.fap)
     meshes = {mesh.part: mesh for mesh in table.meshes}
     for part, number in surface.members.items():
         if part in meshes:
@@ -221,8 +215,7 @@ def _with_push(
 
 
 def _add_forward(mesh: FaceDefMesh, push: Mapping[float, Float64], unit: float) -> FaceDefMesh:
-    """Return a mesh's motion with one along z, (V,) metres of each vertex of the part by value; constant
-    beyond."""
+    """Return a mesh's motion plus one along z, (V,) metres of each vertex by value, constant beyond."""
     values = np.array(sorted(push))
     pushed = np.flatnonzero(np.max([push[value] for value in values], axis=0) > UNMOVED_DISTANCE)
     vertices = np.union1d(mesh.vertices, pushed).astype(np.int32)

@@ -7,8 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from fba.arrays import Float64
-from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
-from fba.face.importers.assembly._pieces import FREE_POINTS
+from fba.face.feature_points import FREE_POINTS, MIRRORED, names, neutral_points, row_of
 from fba.face.importers.assembly._polygon_parts import Piece
 
 ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
@@ -103,8 +102,7 @@ def _put_folds_beyond_lids(pieces: Sequence[Piece], points: Float64) -> None:
 
 
 def _outside(piece: Piece, centre: Float64) -> Float64:
-    """Return (N, 3) vertices of a part that face away from the head's centre: not those of sockets and
-    throat."""
+    """Return (N, 3) vertices that face away from the head's centre: not those of sockets and throat."""
     vertices = piece.part.vertices.astype(np.float64)
     if piece.part.kind != "skin" or piece.part.normals is None:
         return vertices

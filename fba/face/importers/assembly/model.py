@@ -12,11 +12,10 @@ import numpy as np
 from fba.arrays import Bool, Float64, Int32
 from fba.choices import UpAxis
 from fba.errors import ModelError, OptionError
-from fba.face.feature_points import names, row_of
-from fba.face.importers.assembly._default_materials import apply_default_materials
+from fba.face.feature_points import FREE_POINTS, names, row_of
 from fba.face.importers.assembly._definitions import define_by_shapes
-from fba.face.importers.assembly._pieces import FREE_POINTS, assemble, shift_piece
-from fba.face.importers.assembly._polygon_parts import Piece
+from fba.face.importers.assembly._pieces import assemble, shift_piece, turn_pieces
+from fba.face.importers.assembly._polygon_parts import Piece, apply_default_materials
 from fba.face.importers.assembly._repair import drop_false_pupils, repair_tables
 from fba.face.importers.assembly._symmetry import stand_upright_by_points
 from fba.face.importers.assembly._teeth_clearance import clear_teeth
@@ -27,12 +26,12 @@ ADULT_PUPIL_DISTANCE = 0.062
 """Metres between the pupils of an adult."""
 PUPIL_DISTANCES = (0.04, 0.08)
 """Limits of the distance between the pupils of a real head, metres."""
-UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
+UNIT_SIZES = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
 HEAD_RADIUS = 2.5
 """Distance from the middle of the head within which skin is that of the head, in distances of the pupils."""
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
 """Rotations to +x left, +y up, +z forward, by the vertical axis of a file; faces with z up look to -y."""
-EYES = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
+EYE_ROWS = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
 
 
 @dataclass(frozen=True)
@@ -54,14 +53,7 @@ def turn_upright(pieces: Sequence[Piece], points: Float64, up: UpAxis) -> tuple[
     if up == "y":
         return list(pieces), points
     matrix = np.array(AXES[up], dtype=np.float64)
-    result = []
-    for piece in pieces:
-        part = piece.part
-        normals = None if part.normals is None else (part.normals @ matrix.T).astype(np.float32)
-        part = replace(part, vertices=(part.vertices @ matrix.T).astype(np.float32), normals=normals)
-        morphs = {name: (morph @ matrix.T).astype(np.float32) for name, morph in piece.morphs.items()}
-        result.append(replace(piece, part=part, morphs=morphs))
-    return result, points @ matrix.T
+    return turn_pieces(pieces, matrix), points @ matrix.T
 
 
 def finish_import(
@@ -95,7 +87,7 @@ def finish_import(
         shift_piece(piece, size, -origin * size) for piece in assemble(pieces, options.kinds, middle=middle)
     ]
     # a point in the middle of the head, behind the pupils or the lids
-    eyes = np.nanmean((points[EYES] - origin) * size, axis=0)
+    eyes = np.nanmean((points[EYE_ROWS] - origin) * size, axis=0)
     apart = pupil_distance(points) * size
     parts, turned = turn_outward(parts, eyes - (0.0, 0.0, 1.5 * apart), HEAD_RADIUS * apart)
     points = (points - origin) * size
@@ -112,8 +104,7 @@ def finish_import(
 def author_pieces(
     pieces: Sequence[Piece], points: Float64, bound: Int32, *, name: str, notes: Mapping[str, str]
 ) -> FaceModel:
-    """Return the face of finished pieces, its tables made from their shapes if there are any, else from the
-    mesh."""
+    """Return the face of finished pieces, its tables made from their shapes, if any, else from the mesh."""
     parts = tuple(piece.part for piece in pieces)
     # without any vertex, `author` binds points to the nearest, and separates upper and lower lip
     known = bound if (bound >= 0).any() else None
@@ -135,10 +126,7 @@ def author_pieces(
 
 
 def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int32:
-    """Return int32 (84,): vertex of each feature point counted through the pieces, -1 for those without one.
-
-    vertices: their numbers in the file, by point.
-    """
+    """Return int32 (84,): vertex of each point through the pieces, of its number in the file; else -1."""
     bound = np.full(len(names()), -1, dtype=np.int32)
     first: dict[int, int] = {}
     start = 0
@@ -166,7 +154,7 @@ def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, 
             raise ModelError(f"metres per unit must be positive, not {unit!r}")
         return float(unit), f"1 unit is {unit:g} m, as given"
     apart = pupil_distance(points)
-    for name, size in UNITS.items():
+    for name, size in UNIT_SIZES.items():
         if PUPIL_DISTANCES[0] <= apart * size <= PUPIL_DISTANCES[1]:
             return size, f"in {name}: the pupils are {apart * size * 1000:.1f} mm apart"
     return (
@@ -176,8 +164,7 @@ def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, 
 
 
 def pupil_distance(points: Float64) -> float:
-    """Return the distance of the pupils, or of the middles between the eye corners; ModelError where
-    unknown."""
+    """Return the distance of the pupils, or of the middles of the eyes; ModelError where unknown."""
     row = row_of()
     for left, right in ((("3.5",), ("3.6",)), (("3.7", "3.11"), ("3.8", "3.12")), (("3.1",), ("3.2",))):
         ends = [points[[row[name] for name in names]].mean(axis=0) for names in (left, right)]

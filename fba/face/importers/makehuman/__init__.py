@@ -1,4 +1,1 @@
-"""MakeHuman's base mesh, targets and clothes, as a face.
-
-May use: meshes and the assembly of imported pieces.
-"""
+"""MakeHuman's base mesh, targets and clothes, as a face."""

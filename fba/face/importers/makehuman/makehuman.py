@@ -8,11 +8,9 @@ subject's left, +y up, +z forward.
 
 from __future__ import annotations
 
-import csv
 import os
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +18,12 @@ import numpy as np
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError, Remedy
 from fba.face.feature_points import row_of
-from fba.face.importers.assembly._default_materials import LOOKS
 from fba.face.importers.assembly._pieces import shift_piece
-from fba.face.importers.assembly._polygon_parts import Piece, make_piece, polygon_components
+from fba.face.importers.assembly._polygon_parts import LOOKS, Piece, make_piece, polygon_components
 from fba.face.importers.assembly.model import bind_by_number
 from fba.face.model import FaceModel, Material, Part
-from fba.mesh import Polygons, read_obj
-from fba.text_files import find_beside, parse_integer, parse_number, read_bytes, read_words
+from fba.mesh import Polygons, connected, read_obj
+from fba.text_files import find_beside, packaged_rows, parse_integer, parse_number, read_bytes, read_words
 
 METRES = 0.1
 """Metres per unit of the base mesh."""
@@ -36,7 +33,7 @@ CROWN = 881
 """A vertex of the head."""
 PALATE = 656
 """A vertex of the inside of the mouth."""
-EYES = "high-poly.mhclo"
+EYES_FILE = "high-poly.mhclo"
 """The eyes that are used if they lie beside the base mesh; otherwise its helper eyes are."""
 
 HELPERS = (
@@ -114,20 +111,16 @@ def base_file(path: str | os.PathLike[str]) -> Path:
 
 @cache
 def _rows(name: str, key: str) -> dict[str, tuple[int, ...]]:
-    with (files(__package__) / name).open(encoding="utf-8") as file:
-        return {row[key]: tuple(map(int, row["vertices"].split())) for row in csv.DictReader(file)}
+    rows = packaged_rows(__package__, name)
+    return {row[key]: tuple(map(int, row["vertices"].split())) for row in rows}
 
 
 def _head(base: Polygons) -> tuple[Bool, Bool]:
-    """Return (faces of the body that are the head, those of them that are the inside of the mouth), masks
-    (F,).
+    """Return masks (F,) of the body's faces: those of the head, and of these the inside of the mouth.
 
     The head is what can be reached from the crown, the mouth what can be reached from the palate, without
     crossing a loop of `makehuman_cuts.csv`.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     body = np.flatnonzero(base.in_groups("body"))
     starts, sizes = base.starts[body], np.diff(base.starts)[body]
     face = np.repeat(np.arange(len(body)), sizes)
@@ -145,8 +138,7 @@ def _head(base: Polygons) -> tuple[Bool, Bool]:
     order = np.argsort(edge, kind="stable")
     edge, of_edge = edge[order], of_edge[order]
     shared = np.flatnonzero(edge[1:] == edge[:-1])
-    links = (np.ones(len(shared)), (of_edge[shared], of_edge[shared + 1]))
-    _, label = connected_components(coo_array(links, shape=(len(body), len(body))), directed=False)
+    label = connected(np.stack([of_edge[shared], of_edge[shared + 1]], axis=1), len(body))
     masks = []
     for start in (CROWN, PALATE):
         around = face[first == start]
@@ -169,7 +161,7 @@ def _skin(base: Polygons) -> Piece:
 
 def _eyes(file: Path, base: Polygons) -> list[Piece]:
     """Return left and right eyeball: the fitted eyes, else those of the base mesh."""
-    clothes = find_beside(file, EYES)
+    clothes = find_beside(file, EYES_FILE)
     if clothes is None:
         sides = (("left eye", "helper-l-eye"), ("right eye", "helper-r-eye"))
         return [
@@ -194,8 +186,7 @@ def eye_pieces(clothes: Path, base: Float64) -> list[Piece]:
 
 
 def _eyeball(eyes: Polygons, side: float) -> Bool:
-    """Return the faces of one eyeball, without the transparent cornea in front of it, which is a mesh of its
-    own."""
+    """Return the faces of an eyeball without the transparent cornea before it, which is a mesh by itself."""
     of_vertex, of_face = polygon_components(eyes)
     used = np.unique(eyes.corners)
     component, vertices = of_vertex[used], eyes.vertices[used]
@@ -206,9 +197,8 @@ def _eyeball(eyes: Polygons, side: float) -> Bool:
     front[~(across > 0)] = np.inf
     best = int(front.argmin())
     if not np.isfinite(front[best]):
-        raise ModelError(f"{EYES}: there is no {'left' if side > 0 else 'right'} eye in it")
-    mask: Bool = of_face == best
-    return mask
+        raise ModelError(f"{EYES_FILE}: there is no {'left' if side > 0 else 'right'} eye in it")
+    return np.asarray(of_face == best)
 
 
 def _feature_points(base: Polygons, pieces: list[Piece]) -> tuple[Float64, Int32]:

@@ -16,8 +16,7 @@ from fba.arrays import Float64
 from fba.atomic import atomic
 from fba.errors import ModelError
 from fba.face.feature_points import names, row_of
-from fba.face.importers.points.fdp import read_fdp
-from fba.face.importers.points.xface import xface_points
+from fba.face.importers.points.fdp import read_fdp, xface_points
 from fba.text_files import parse_integer, parse_number, read_bytes, read_lines
 
 MAX_JSON = 1 << 24
@@ -63,8 +62,7 @@ def given_points(points: object) -> GivenPoints:
 
 
 def points_beside(path: Path, endings: Sequence[str]) -> GivenPoints | None:
-    """Return the feature points from the first file beside a mesh that has its name and one of the endings,
-    or None."""
+    """Return the points of the first file beside a mesh with its name and one of the endings, or None."""
     for ending in endings:
         candidate = path.with_name(path.stem + ending)
         if candidate.is_file():

@@ -92,9 +92,9 @@ def probe_encoded(animation: Animation) -> StreamInfo | None:
     tracks = [track for track in (animation.face, animation.body) if track is not None]
     if not len(animation) or sum(int(track.mask.sum()) for track in tracks) > MAX_VALUES:
         return None
-    try:
-        from fba.planning import encode
+    from fba.planning import encode
 
+    try:
         return probe_stream(encode(animation))
     except (FbaError, ValueError):
         return None

@@ -1,19 +1,20 @@
-"""Brows, cheeks, chin and nose: FAPs whose feature points pull at the skin around them.
+"""Brows, cheeks, chin, nose and ears: FAPs whose feature points pull at the skin around them.
 
-`regions.csv` lists the points and bounds of each region, `handles.csv` the points that each FAP moves;
-the right side mirrors the left.
+`regions.csv` lists the points and bounds of each region but the ears, `handles.csv` the points that each FAP
+moves; the right side mirrors the left. A raised ear turns about its soft root; a pulled one moves most at its
+rim.
 """
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from itertools import pairwise
 
 import numpy as np
 
-from fba.arrays import Bool, Float64
+from fba.arrays import Bool, Float64, Intp
+from fba.easing import smoothstep
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion
 from fba.face.authoring.surface._motion_limits import eased_linear_motion
@@ -25,12 +26,32 @@ from fba.face.authoring.surface._weights import (
     trim_small,
 )
 from fba.face.authoring.surface.landmarks import Landmarks
-from fba.face.feature_points import MIRRORED
+from fba.face.feature_points import MATES
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
+from fba.text_files import packaged_rows
 
 SMOOTHING_ROUNDS = 5
 """Rounds of averaging the motion of surfaces behind the skin."""
+EARS = {
+    "left": {"top": "10.1", "back": "10.3", "lobe": "10.5", "below": "10.7", "above": "10.9"},
+    "right": {"top": "10.2", "back": "10.4", "lobe": "10.6", "below": "10.8", "above": "10.10"},
+}
+"""Feature points of the ears; "below" and "above" are where they meet the face."""
+RAISED_EARS = {65: "left", 66: "right"}
+PULLED_EARS = {67: "left", 68: "right"}
+RIGID_WIDTH = 0.55
+"""Share of the ear's width from its rim up to which it moves as a whole."""
+ROOT_WIDTH = 1.15
+"""Share of the ear's width from its rim beyond which it does not move."""
+FADE_RADII = (1.1, 1.7)
+"""Multiples of the ear's size between which the motion of the head around it fades out."""
+DEPTH_FACTOR = 1.2
+"""The ear is taken to be deeper, front to back, than its points say by this factor."""
+LEAST_PULL = 0.1
+"""Share of a pull that the root of the ear makes."""
+EAR_SMOOTHING_ROUNDS = 6
+"""Rounds of averaging shares with those of neighbours."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +100,7 @@ def regions() -> dict[str, Region]:
             float(row["through"]),
             row["behind"],
         )
-        for row in _rows("regions.csv")
+        for row in packaged_rows(__package__, "regions.csv")
     }
 
 
@@ -87,14 +108,13 @@ def regions() -> dict[str, Region]:
 def handles() -> tuple[Handle, ...]:
     """Return the handles of all FAPs, right mates included."""
     result = []
-    mirror = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
-    for row in _rows("handles.csv"):
+    for row in packaged_rows(__package__, "handles.csv"):
         pairs = (pair.split("=") for pair in row["values"].split())
         left = {name: float(value) for name, value in pairs}
         result.append(Handle(int(row["fap"]), row["region"], left, float(row["bulge"])))
         mate = faps()[int(row["fap"]) - 1].left_right_mate
         if mate is not None:
-            right = {mirror.get(name, name): value for name, value in left.items()}
+            right = {MATES.get(name, name): value for name, value in left.items()}
             result.append(Handle(mate, row["region"], right, float(row["bulge"])))
     return tuple(result)
 
@@ -113,8 +133,7 @@ def brow_cheek_nose_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[in
 
 
 def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64, Bool]:
-    """Return ((N, H) share of each handle's motion at each vertex, (N,) mask of vertices whose share is
-    given)."""
+    """Return (N, H) shares of each handle's motion, and an (N,) mask of vertices whose share is given."""
     surface, es = marks.surface, marks.fapu.ES * 1024
     points = [name for name in area.points if marks.has(name)]
     pulled = marks.vertices_of(points)
@@ -152,6 +171,46 @@ def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, 
     return eased_linear_motion(marks.surface, limiter, vertices, field, handle.fap, pinned)
 
 
-def _rows(name: str) -> list[dict[str, str]]:
-    with (files(__package__) / name).open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+def ear_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], dict[int, str]]:
+    """Return (motions of the surface by FAP, reasons by FAP for those that this face cannot have)."""
+    motions: dict[int, Motion] = {}
+    lost: dict[int, str] = {}
+    for fap, side in (RAISED_EARS | PULLED_EARS).items():
+        if reason := marks.missing_point(fap):
+            lost[fap] = reason
+            continue
+        share = _ear_share(marks, side, pull=fap in PULLED_EARS)
+        vertices = np.flatnonzero(share)
+        pinned = marks.surface.mask(marks.vertices_of(faps()[fap - 1].feature_points))
+        field = share[vertices][:, None] * marks.step(fap)
+        motions[fap] = eased_linear_motion(marks.surface, limiter, vertices, field, fap, pinned)
+    return motions, lost
+
+
+def _ear_share(marks: Landmarks, side: str, *, pull: bool) -> Float64:
+    """Return (N,) share of the ear's motion at each vertex."""
+    names = EARS[side]
+    surface = marks.surface
+    top, back, lobe, below, above = (marks.point_or_average(name) for name in names.values())
+    root = (below + above) / 2
+    width = float(np.linalg.norm(back - root))
+    rim = _rim(marks, names)
+    away = surface.distances(rim, 1.5 * width) / width
+    share = 1 - smoothstep((np.nan_to_num(away, posinf=9.0) - RIGID_WIDTH) / (ROOT_WIDTH - RIGID_WIDTH))
+    share = average_with_neighbours(surface, share, EAR_SMOOTHING_ROUNDS)
+    centre = ((top + lobe) / 2 + (back + root) / 2) / 2
+    half = np.array([np.inf, np.linalg.norm(top - lobe) / 2, abs(back[2] - root[2]) / 2 * DEPTH_FACTOR])
+    beside = np.linalg.norm((surface.vertices - centre) / half, axis=1)
+    share *= 1 - smoothstep((beside - FADE_RADII[0]) / (FADE_RADII[1] - FADE_RADII[0]))
+    if pull:
+        out = root - back
+        far = 1 - ((surface.vertices - back) @ out) / (out @ out)
+        share = share * (LEAST_PULL + (1 - LEAST_PULL) * np.clip(far, 0.0, 1.2))
+    own = marks.vertex[names["back" if pull else "top"]]
+    return trim_small(share / max(share[own], 1e-9))
+
+
+def _rim(marks: Landmarks, names: dict[str, str]) -> Intp:
+    """Return the vertices around the ear, from its upper end at the face over the back to the lobe."""
+    known = marks.vertices_of(names[key] for key in ("top", "back", "lobe"))
+    return np.unique(np.concatenate([known, *(marks.surface.path(a, b) for a, b in pairwise(known))]))

@@ -1,12 +1,17 @@
-"""Materials of an OBJ file: its .mtl files, colours and one picture each."""
+"""Materials of an OBJ file: its .mtl files, colours and one picture each; and the pixels of pictures."""
 
 from __future__ import annotations
 
+import io
+import math
 import os
-import warnings
 from pathlib import Path
 
-from fba.errors import FbaWarning, ModelError
+import numpy as np
+
+from fba.arrays import UInt8
+from fba.errors import ModelError, warn
+from fba.limits import DEFAULT_LIMITS
 from fba.mesh._meshes import Material
 from fba.text_files import find_beside, parse_number, read_bytes, read_words
 
@@ -23,17 +28,10 @@ class Pictures:
         self._known: dict[Path, bytes] = {}
 
     def read(self, file: os.PathLike[str], name: str, where: str) -> bytes:
-        """Return the PNG or JPEG of this name beside a file; b"" with an FbaWarning where it is neither.
-
-        where: the line that names it.
-        """
+        """Return a PNG or JPEG beside a file; b"" with a warning if it is neither. where: its line."""
         path = find_beside(file, name)
         if path is None:
-            warnings.warn(
-                f"{where}: the picture {name!r} is not in the folder of the file; left out",
-                FbaWarning,
-                stacklevel=5,
-            )
+            warn(f"{where}: the picture {name!r} is not in the folder of the file; left out", stacklevel=5)
             return b""
         if path not in self._known:
             self._known[path] = _picture(path, where)
@@ -54,11 +52,7 @@ def read_mtl(
     materials: dict[str, Material] = {}
     pictures = Pictures() if pictures is None else pictures
     if file is None:
-        warnings.warn(
-            f"{path}: the file of its materials, {library!r}, is not in its folder; left out",
-            FbaWarning,
-            stacklevel=4,
-        )
+        warn(f"{path}: the file of its materials, {library!r}, is not in its folder; left out", stacklevel=4)
         return materials
     name: str | None = None
     colour, rough, picture = (0.8, 0.8, 0.8), 0.6, b""
@@ -88,9 +82,30 @@ def _picture(path: Path, where: str) -> bytes:
     try:
         content = read_bytes(path, MAX_PICTURE)
     except ModelError as error:
-        warnings.warn(f"{where}: {error}", FbaWarning, stacklevel=5)
+        warn(f"{where}: {error}", stacklevel=5)
         return b""
     if not content.startswith(PICTURES):
-        warnings.warn(f"{where}: {path.name!r} is neither PNG nor JPEG; left out", FbaWarning, stacklevel=5)
+        warn(f"{where}: {path.name!r} is neither PNG nor JPEG; left out", stacklevel=5)
         return b""
     return content
+
+
+def read_pixels(texture: bytes, most: float = math.inf) -> UInt8 | None:
+    """Return uint8 (H, W, 4) of a PNG, JPEG or WebP picture, at most `most` pixels wide and high.
+
+    None where it is damaged, or has more pixels than the default limits allow.
+    """
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(texture), formats=("PNG", "JPEG", "WEBP")) as image:
+            if image.width * image.height > DEFAULT_LIMITS.pixels:
+                return None
+            factor = min(most / max(image.size), 1.0)
+            whole: Image.Image = image.convert("RGBA")
+            if factor < 1:
+                size = max(int(image.width * factor), 1), max(int(image.height * factor), 1)
+                whole = whole.resize(size, Image.Resampling.LANCZOS)
+            return np.asarray(whole)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        return None
