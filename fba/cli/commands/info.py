@@ -148,13 +148,13 @@ def _print_person(path: Path, size: int, person: PersonInfo) -> None:
 def _summarise_markers(face: FaceCapture) -> dict[str, Any] | None:
     """Return what a capture of markers holds, which may be no face; None for other captures."""
     from fba.capture import MarkerMotion
-    from fba.capture.markers.summary import summarise
+    from fba.capture.markers.marker_maps import summarise
 
     return summarise(face) if isinstance(face, MarkerMotion) else None
 
 
 def _print_markers(capture: Mapping[str, Any]) -> None:
-    """Print what is in a capture of markers, as `fba.capture.markers.summary` says it."""
+    """Print what is in a capture of markers, as `fba.capture.markers.marker_maps` says it."""
     start = f" from {clock_text(capture['start'])}" if capture["start"] is not None else ""
     click.echo(
         f"  time     {capture['frames']} frames, {seconds_text(capture['seconds'])} at "

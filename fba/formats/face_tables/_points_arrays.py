@@ -15,7 +15,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import PointMotion
-from fba.capture.points.motion import COUNTS, OTHERS, check_count
+from fba.capture.points.motion import COUNTS, OTHER_TRACKERS, check_count
 from fba.capture.sampling import find_rate
 from fba.errors import FormatError, ModelError, Remedy
 from fba.formats.face_tables._points import build_points
@@ -79,7 +79,7 @@ def _choose(arrays: dict[str, Any], path: Path, face: str | None) -> tuple[Float
                 raise FormatError(f"has no face {face!r}; there are 0 to {faces - 1}", path=path)
             return points[:, number], []
         shapes[name] = arrays[name].shape
-        if points is not None and points.shape[2] in OTHERS:
+        if points is not None and points.shape[2] in OTHER_TRACKERS:
             try:
                 check_count(points.shape[2])
             except ModelError as error:
