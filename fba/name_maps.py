@@ -105,6 +105,19 @@ def change_known_names(
     return dict(sorted(result.items(), key=lambda pair: order.get(pair[0], len(order))))
 
 
+def simplify(name: str) -> str:
+    """Return letters and digits of a name in lower case, without a prefix: "Anna:Left_Leg" -> "leftleg"."""
+    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
+
+
+def both_sides(text: str) -> list[tuple[str, str]]:
+    """Return ("l", "LeftArm") and ("r", "RightArm") for "(Left|Right)Arm"; ("", text) without sides."""
+    sides = re.search(r"\((\w+)\|(\w+)\)", text)
+    if sides is None:
+        return [("", text)]
+    return [(side, text.replace(sides[0], word)) for side, word in zip("lr", sides.groups(), strict=True)]
+
+
 def list_names(names: Sequence[str]) -> str:
     """Return names as text, at most `MAX_LISTED` of them."""
     return ", ".join(names[:MAX_LISTED]) + (

@@ -70,7 +70,6 @@ fba.capture.sampling
 fba.capture._limbs
 fba.capture.comparison
 fba.capture.blendshapes
-fba.capture.action_units
 fba.capture.points
 fba.capture
 fba.capture.live

@@ -7,8 +7,13 @@ May use: parameters, face and body, and the modules of `fba` itself.
 from fba.capture._conversion import FaceCapture, capture_options, make_animation
 from fba.capture._report import BoneError, FeetError, RetargetReport, measure_bones, retarget_report
 from fba.capture._retarget import SkeletonOptions
-from fba.capture.action_units import ActionUnitMotion, from_action_units
-from fba.capture.blendshapes import ShapeMotion, from_blendshapes, to_blendshapes
+from fba.capture.blendshapes import (
+    ActionUnitMotion,
+    ShapeMotion,
+    from_action_units,
+    from_blendshapes,
+    to_blendshapes,
+)
 from fba.capture.markers._faces import from_markers
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion

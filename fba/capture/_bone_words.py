@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
-LONGEST_NAME = 200
-"""Characters of a name that are read."""
-HALVES = {
+from fba.source import read_table
+
+MAX_NAME_LENGTH = 200
+"""Largest number of characters of a name that are read, from its end."""
+JOINED_WORDS = {
     ("upper", "arm"): "upperarm",
     ("upper", "leg"): "thigh",
     ("lower", "arm"): "forearm",
@@ -25,15 +25,16 @@ HALVES = {
     ("low", "arm"): "forearm",
     ("low", "leg"): "shank",
 }
-"""Pairs of words that mean one."""
+"""Pairs of words that mean the same as a single word."""
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name says. side: "l", "r" or "". parts: part -> 2 if named for certain, 1 if perhaps.
+    """What a name says.
 
-    numbers: the name's numbers, in order. helper: whether it names something beside the body's own bones,
-    such as a twist bone, an end or an eye. unknown: letters that no word explains.
+    side: "l", "r" or "". parts: part -> 2 if named for certain, 1 if perhaps. numbers: the name's numbers, in
+    order. helper: whether it names something that is no bone of a body, such as a twist bone, an end or an
+    eye. unknown: count of letters that no word explains.
     """
 
     side: str
@@ -46,13 +47,12 @@ class Meaning:
 @cache
 def _words() -> dict[str, tuple[str, ...]]:
     """Return word -> what it means."""
-    text = (files(__package__) / "bone_words.csv").read_text(encoding="utf-8")
-    return {row["word"]: tuple(row["means"].split()) for row in csv.DictReader(text.splitlines())}
+    return {row["word"]: tuple(row["means"].split()) for row in read_table(__package__, "bone_words.csv")}
 
 
 def read(name: str) -> Meaning:
     """Return the meaning of a name: "mixamorig:LeftUpLeg", "thigh_l", "rshldr", "Bip01 R Calf"."""
-    plain = re.split(r"[:|]", name[-LONGEST_NAME:])[-1]
+    plain = re.split(r"[:|]", name[-MAX_NAME_LENGTH:])[-1]
     pieces = re.findall(r"[A-Z]+(?![a-zß-ÿ])|[A-Z]?[a-zß-ÿ]+|[0-9]+|[^\W\d_A-Za-zß-ÿ]+", plain)
     words: list[str] = []
     numbers: list[int] = []
@@ -61,15 +61,15 @@ def read(name: str) -> Meaning:
         if piece.isascii() and piece.isdigit():
             numbers.append(int(piece[:9]))
             continue
-        found = _split(piece.lower())
-        if found is None:
+        split = _split(piece.lower())
+        if split is None:
             unknown += len(piece)
         else:
-            words.extend(found)
+            words.extend(split)
     joined: list[str] = []
     for word in words:
-        if joined and (joined[-1], word) in HALVES:
-            joined[-1] = HALVES[joined[-1], word]
+        if joined and (joined[-1], word) in JOINED_WORDS:
+            joined[-1] = JOINED_WORDS[joined[-1], word]
         else:
             joined.append(word)
     side, parts, helper = "", dict[str, int](), False
@@ -86,21 +86,21 @@ def read(name: str) -> Meaning:
 
 
 def _split(piece: str) -> list[str] | None:
-    """Return the known words that a piece consists of, as few as possible; None if it does not.
+    """Return the fewest words of the table that make up a piece; None if none do.
 
-    A side's single letter counts at either end only: "rhand", "lthighbend", but not "br-l-ow".
+    The single letter of a side counts only at either end: "rhand", "lthighbend", but not "br-l-ow".
     """
     words = _words()
     best: list[list[str] | None] = [[]]
     for end in range(1, len(piece) + 1):
-        found: list[str] | None = None
+        shortest: list[str] | None = None
         for begin in range(end):
             before, word = best[begin], piece[begin:end]
             if before is None or word not in words:
                 continue
             if len(word) == 1 and word.isascii() and not (len(piece) == 1 or begin == 0 or end == len(piece)):
                 continue
-            if found is None or len(before) + 1 < len(found):
-                found = [*before, word]
-        best.append(found)
+            if shortest is None or len(before) + 1 < len(shortest):
+                shortest = [*before, word]
+        best.append(shortest)
     return best[-1]

@@ -9,8 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from fba.capture._retarget import SkeletonOptions
-from fba.capture.action_units import ActionUnitMotion, from_action_units
-from fba.capture.blendshapes import ShapeMotion, from_blendshapes
+from fba.capture.blendshapes import ActionUnitMotion, ShapeMotion, from_action_units, from_blendshapes
 from fba.capture.markers._faces import from_markers
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion
@@ -39,7 +38,7 @@ _OPTIONS: Mapping[str, tuple[str, ...]] = {
 def capture_options(kind: str) -> tuple[str, ...]:
     """Return the options of `make_animation` for a kind of capture; none for an unknown one.
 
-    kind: "skeleton", "shapes", which action units are as well, "markers" or "points".
+    kind: "skeleton", "shapes" (also for action units), "markers" or "points".
     """
     return _OPTIONS.get(kind, ())
 
@@ -54,10 +53,10 @@ def make_animation(
 ) -> Captured:
     """Return the animation of a capture, together with the capture.
 
-    rate: frames per second; None for the capture's own. path: the file that it is from, for messages.
-    options: of a skeleton the fields of `SkeletonOptions`, of others those of `from_markers` and
-    `from_points`. Warns (FbaWarning) of what the reader repaired. Raises FormatError where no animation can
-    be made, and what these functions raise.
+    rate: frames per second; None for that of the capture. path: its file, for messages. options: of a
+    skeleton the fields of `SkeletonOptions`, of faces the options of `from_markers` and `from_points`. Warns
+    (FbaWarning) of what the reader repaired. Raises FormatError where no animation can be made, and the
+    errors of these functions.
     """
     for finding in getattr(capture, "findings", ()):
         warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=4)

@@ -1,8 +1,8 @@
-"""Find the bones of a skeleton from the words in its joints' names, together with where the joints hang.
+"""Find the bones of a skeleton from the words in the names of its joints, and from their hierarchy.
 
-A word such as "shoulder" or "leg" means one joint in one file and the next in another. So each limb is taken
-as a whole: of all ways to give its joints, in order from the trunk, the parts of a limb, the one counts that
-agrees best with the words and with the lengths of bones.
+A word such as "shoulder" or "leg" means different joints in different files. So each limb is matched as a
+whole: all assignments of its parts to joints, in order from the trunk, are scored by the words and by the
+lengths of bones, and the best counts.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from fba.arrays import Float64, Int64
 from fba.body import Skeleton
 from fba.body.skeleton import ROOT
 from fba.capture._bone_words import Meaning, read
+from fba.capture._spine import heights as spine_heights
 from fba.capture._spine import joints as spine_joints
+from fba.capture.motion import SkeletonMotion
 
 LIMBS = {
     "leg": (("thigh", "hip"), ("shank", "knee"), ("foot", "ankle")),
@@ -27,20 +29,18 @@ FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 MIN_LENGTH_RATIO = 0.3
 """Smallest plausible ratio of the lengths of a limb's two bones, shorter to longer."""
 HELPER_COST = 3
-"""What a joint loses that its name calls a helper, such as "twist"; a certain word counts 2."""
+"""What the score of a joint loses if its name calls it a helper, such as "twist"; a certain word gains 2."""
 MAX_CHAIN = 16
-"""Largest number of joints of a limb that are tried."""
+"""Largest number of joints that are tried for the parts of a limb."""
 MAX_ENDS = 32
 """Largest number of hands or feet of one side that are tried."""
 
 
-def find(names: Sequence[str], parents: Int64, offsets: Float64, skeleton: Skeleton) -> dict[str, int]:
-    """Return joint of the body -> number of the source's joint; empty if there is no pair of whole legs.
-
-    parents: (J,). offsets: (J, 3), whose lengths count only.
-    """
+def find(motion: SkeletonMotion, skeleton: Skeleton) -> dict[str, int]:
+    """Return joint of the body -> number of the source's joint; empty without two whole legs."""
+    names, parents = motion.names, motion.parents
     meanings = [read(name) for name in names]
-    lengths = np.linalg.norm(offsets, axis=1)
+    lengths = np.linalg.norm(motion.offsets, axis=1)
     mapped: dict[str, int] = {}
     for side in "lr":
         for limb, parts in LIMBS.items():
@@ -60,15 +60,16 @@ def find(names: Sequence[str], parents: Int64, offsets: Float64, skeleton: Skele
         mapped["sacroiliac"], hips = hips, trunk
     mapped[ROOT] = hips
     for side in "lr":
-        mapped |= _toe(side, mapped, meanings, parents)
+        mapped |= _toe(side, mapped, meanings, motion)
         mapped |= _clavicle(side, mapped, meanings, parents)
-        mapped |= _fingers(side, mapped, names, meanings, parents)
-    mapped |= _spine(mapped, meanings, parents, lengths, skeleton)
+        if f"{side}_wrist" in mapped:
+            mapped |= _fingers(side, motion.descendants(mapped[f"{side}_wrist"]), names, meanings, parents)
+    mapped |= _spine(mapped, meanings, motion, lengths, skeleton)
     return {joint: number for joint, number in mapped.items() if joint in skeleton}
 
 
 def _path(parents: Int64, joint: int) -> list[int]:
-    """Return the joints from the root down to one."""
+    """Return the joints from the root down to a joint."""
     path = [joint]
     while (joint := int(parents[joint])) >= 0:
         path.append(joint)
@@ -85,21 +86,21 @@ def _limb(
     side: str, limb: str, parts: Sequence[tuple[str, str]], meanings: Sequence[Meaning], parents: Int64,
     lengths: Float64,
 ) -> dict[str, int]:  # fmt: skip
-    """Return the three joints of one limb, or nothing."""
+    """Return the three joints of a limb; empty if no joints are likely to be it."""
     words = {part for part, _ in parts}
-    other = {part for key, value in LIMBS.items() if key != limb for part, _ in value}
+    other_words = {part for key, value in LIMBS.items() if key != limb for part, _ in value}
     best: tuple[float, tuple[int, ...]] = (-np.inf, ())
-    last = {
+    ends = [
         number
         for number, meaning in enumerate(meanings)
         if meaning.side == side and parts[2][0] in meaning.parts and not meaning.helper
-    }
-    for end in sorted(last)[:MAX_ENDS]:
+    ]
+    for end in ends[:MAX_ENDS]:
         path = _path(parents, end)
         chain = [
             number
             for number in path
-            if meanings[number].side in (side, "") and not other & _certain(meanings[number])
+            if meanings[number].side in (side, "") and not other_words & _certain(meanings[number])
         ][-MAX_CHAIN:]
         chain = [
             number
@@ -114,18 +115,18 @@ def _limb(
             bones = [reach[b] - reach[a] for a, b in pairwise(three)]
             if min(bones) < MIN_LENGTH_RATIO * max(bones):
                 score -= 2
-            score += 0.01 * (three[0] - end) / max(len(parents), 1)  # of two hips, the one closer to the knee
+            score += 0.01 * (three[0] - end) / max(len(parents), 1)  # of two hips, the closer to the knee
             if score > best[0]:
                 best = (score, three)
     if best[0] < 3:
-        return {} if last else _numbered_limb(side, limb, meanings, parents)
+        return {} if ends else _numbered_limb(side, limb, meanings, parents)
     return {f"{side}_{joint}": number for number, (_, joint) in zip(best[1], parts, strict=True)}
 
 
 def _numbered_limb(side: str, limb: str, meanings: Sequence[Meaning], parents: Int64) -> dict[str, int]:
-    """Return the joints of a limb that are all called the same, "leg_joint_L_1" to 3, from the trunk on.
+    """Return the joints of a limb that differ by numbers only, "leg_joint_L_1" to 3 from the trunk.
 
-    A fourth of a leg is the toes'. Nothing if there are several such limbs, as of animals.
+    The fourth of a leg is that of the toes. Empty for several such limbs, as of animals.
     """
     words = {part for part, _ in LIMBS[limb]}
     named = {
@@ -146,14 +147,14 @@ def _numbered_limb(side: str, limb: str, meanings: Sequence[Meaning], parents: I
 
 
 def _has_four_legs(mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64) -> bool:
-    """Whether each side has another leg beside the one that was found, as animals have."""
+    """Whether each side has a leg beside the mapped leg, as animals have."""
     legs = [part for part, _ in LIMBS["leg"]]
     for side in "lr":
-        own = {mapped.get(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")}
+        leg = {mapped.get(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")}
         others = {
             part
             for number, meaning in enumerate(meanings)
-            if meaning.side == side and not meaning.helper and own.isdisjoint(_path(parents, number))
+            if meaning.side == side and not meaning.helper and leg.isdisjoint(_path(parents, number))
             for part in legs
             if part in meaning.parts
         }
@@ -167,30 +168,22 @@ def _certain(meaning: Meaning) -> set[str]:
 
 
 def _score(meaning: Meaning, part: str, side: str) -> float:
-    """Return how well a name agrees with a part of a limb: 2 if it says so, less if it says another."""
+    """Return how well a name agrees with a part of a limb: 2 if it names it, less if it names another."""
     value = float(meaning.parts.get(part, -1.5 if meaning.parts else -0.5))
     if part in meaning.parts and len(_certain(meaning) - {part, "hips"}):
         value -= 1.0  # "LeftHandThumb1" is a thumb
     return value - HELPER_COST * meaning.helper - (0.5 if meaning.side != side else 0.0)
 
 
-def _below(parents: Int64, joint: int) -> list[int]:
-    """Return all joints below one, in the file's order."""
-    under = {joint}
-    result = []
-    for number, parent in enumerate(parents):
-        if int(parent) in under:
-            under.add(number)
-            result.append(number)
-    return result
-
-
-def _toe(side: str, mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64) -> dict[str, int]:
-    """Return the joint of the toes: the first below the ankle with that name; of several, the middle one."""
-    depth = {mapped[f"{side}_ankle"]: 0}
+def _toe(
+    side: str, mapped: dict[str, int], meanings: Sequence[Meaning], motion: SkeletonMotion
+) -> dict[str, int]:
+    """Return the joint of the toes: the highest below the ankle with that name; of several, the middle."""
+    ankle, *below = motion.descendants(mapped[f"{side}_ankle"])
+    depth = {ankle: 0}
     toes: list[int] = []
-    for number in _below(parents, mapped[f"{side}_ankle"]):
-        depth[number] = depth[int(parents[number])] + 1
+    for number in below:
+        depth[number] = depth[int(motion.parents[number])] + 1
         if "toe" in meanings[number].parts and not meanings[number].helper:
             toes.append(number)
     if not toes:
@@ -204,7 +197,7 @@ def _toe(side: str, mapped: dict[str, int], meanings: Sequence[Meaning], parents
 def _clavicle(
     side: str, mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64
 ) -> dict[str, int]:
-    """Return the clavicle: the joint between trunk and upper arm that is named so, or has the arm's side."""
+    """Return the clavicle: the joint between trunk and upper arm with that name, or with the arm's side."""
     if f"{side}_shoulder" not in mapped:
         return {}
     above = [
@@ -217,15 +210,13 @@ def _clavicle(
 
 
 def _fingers(
-    side: str, mapped: dict[str, int], names: Sequence[str], meanings: Sequence[Meaning], parents: Int64
+    side: str, hand: Sequence[int], names: Sequence[str], meanings: Sequence[Meaning], parents: Int64
 ) -> dict[str, int]:
-    """Return three joints for each finger below the wrist."""
-    if f"{side}_wrist" not in mapped:
-        return {}
+    """Return three joints for each finger. hand: the wrist and all joints below it."""
     numbered = [m.numbers[0] for m in meanings if "finger" in m.parts and m.numbers]
     first = 0 if any(_digit(number) == 0 for number in numbered) else 1  # the thumb's
     chains: dict[str, list[int]] = {}
-    for number in _below(parents, mapped[f"{side}_wrist"]):
+    for number in hand[1:]:
         meaning = meanings[number]
         named = [finger for finger in FINGERS if finger in meaning.parts]
         finger = next((f for f in named if f != "middle"), named[0] if named else None)  # "ring_mid"
@@ -233,9 +224,8 @@ def _fingers(
         if above is not None and (finger in (None, above)):
             finger = above
         elif finger is None and "finger" in meaning.parts and meaning.numbers:
-            which = meaning.numbers[0] if len(meaning.numbers) > 1 else _digit(meaning.numbers[0])
-            which -= first
-            finger = FINGERS[which] if 0 <= which < len(FINGERS) else None
+            digit = meaning.numbers[0] if len(meaning.numbers) > 1 else _digit(meaning.numbers[0])
+            finger = FINGERS[digit - first] if 0 <= digit - first < len(FINGERS) else None
         if finger is None or meaning.helper or (above is None and finger in chains):
             continue
         if "meta" in meaning.parts or "inhand" in names[number].lower():  # Rokoko: "LeftInHandIndex"
@@ -264,9 +254,9 @@ def _digit(number: int) -> int:
 
 
 def _crown(top: int, meanings: Sequence[Meaning], parents: Int64) -> list[int]:
-    """Return the joints of neck and head that have no such names: the chain in the middle, above the arms.
+    """Return the joints of a neck and head without such names: the chain that rises between the arms.
 
-    That is the longest one that hangs on the joint that the arms hang on, if it has no side and no helpers.
+    It begins above `top`, the joint that the arms hang on. Its joints have no side and are no helpers.
     """
     chain: list[int] = []
     joint = top
@@ -283,21 +273,22 @@ def _crown(top: int, meanings: Sequence[Meaning], parents: Int64) -> list[int]:
 
 
 def _spine(
-    mapped: dict[str, int], meanings: Sequence[Meaning], parents: Int64, lengths: Float64, skeleton: Skeleton
+    mapped: dict[str, int],
+    meanings: Sequence[Meaning],
+    motion: SkeletonMotion,
+    lengths: Float64,
+    skeleton: Skeleton,
 ) -> dict[str, int]:
     """Return the joints of back, neck and head, spread over the vertebrae by their heights on the spine."""
-    hips = mapped[ROOT]
+    hips, parents = mapped[ROOT], motion.parents
     limbs = set(mapped.values()) - {hips}
-    heads = [
+    middle = [
         number
-        for number in _below(parents, hips)
-        if "head" in meanings[number].parts and not meanings[number].side and not meanings[number].helper
+        for number in motion.descendants(hips)[1:]
+        if not meanings[number].side and not meanings[number].helper
     ]
-    necks = [
-        number
-        for number in _below(parents, hips)
-        if "neck" in meanings[number].parts and not meanings[number].side and not meanings[number].helper
-    ]
+    heads = [number for number in middle if "head" in meanings[number].parts]
+    necks = [number for number in middle if "neck" in meanings[number].parts]
     result: dict[str, int] = {}
     arms = [mapped[f"{side}_shoulder"] for side in "lr" if f"{side}_shoulder" in mapped]
     if heads:
@@ -314,10 +305,10 @@ def _spine(
             result["skullbase"] = top
     else:
         return {}
-    way = _path(parents, top)
-    if hips not in way:
+    path = _path(parents, top)
+    if hips not in path:
         return result
-    line = [number for number in way[way.index(hips) + 1 :] if number not in limbs]
+    line = [number for number in path[path.index(hips) + 1 :] if number not in limbs]
     neck = [number for number in line if number in necks]
     neck = neck[:2] if len(neck) < 4 else [neck[0], neck[len(neck) // 2]]
     if neck:
@@ -325,22 +316,27 @@ def _spine(
         if len(neck) > 1:
             result["vc4"] = neck[1]
     end = line.index(neck[0]) if neck and neck[0] in line else len(line) - (1 if heads else 0)
-    back = line[:end]
-    total = float(sum(lengths[number] for number in line[: end + 1]))
+    return result | _vertebrae(line[:end], lengths[line[: end + 1]], skeleton)
+
+
+def _vertebrae(back: Sequence[int], lengths: Float64, skeleton: Skeleton) -> dict[str, int]:
+    """Return a vertebra for each joint of the back, the nearest to its height.
+
+    lengths: of the bones below these joints, and below the next.
+    """
     chain = spine_joints(skeleton)
+    total = float(sum(lengths))
     if "vc7" not in chain or "vl5" not in chain or not back or total <= 0:
-        return result
-    centres = np.array([skeleton.centres[skeleton.number(joint)] for joint in chain])
-    height = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
+        return {}
+    heights = spine_heights(skeleton, chain)
     first, last = chain.index("vl5"), chain.index("vc7")
+    result = {}
     reach = 0.0
     at = first
     for count, number in enumerate(back):
-        reach += float(lengths[number])
-        room = last - (len(back) - count)
-        wanted = reach / total * height[last]
-        nearest = int(np.argmin(np.abs(height - wanted)))
-        at = min(max(nearest, at), room)
+        reach += float(lengths[count])
+        nearest = int(np.argmin(np.abs(heights - reach / total * heights[last])))
+        at = min(max(nearest, at), last - (len(back) - count))
         if at >= first:
             result[chain[at]] = number
         at += 1

@@ -29,7 +29,7 @@ class BoneError:
     """Angles in degrees between a bone of the source and that of the body.
 
     joint, aim: joints of the standard at its ends. source: name of the source's joint. mean, worst: over all
-    frames. frame: that of the worst.
+    frames. frame: where the worst is.
     """
 
     joint: str
@@ -44,9 +44,9 @@ class BoneError:
 class FeetError:
     """Errors in metres of the heights of soles above the ground, while the source's foot is on it.
 
-    ground: height of the source's. frames: number of those with a foot on the ground, both feet counted.
-    mean, worst: of the differences between the source, scaled, and the body. within: share of differences up
-    to 1 cm.
+    ground: height of the source's. frames: number of frames in which a foot is on the ground, counted for
+    each foot. mean, worst: of the differences between the source, scaled, and the body. within: share of
+    differences up to 1 cm.
     """
 
     ground: float
@@ -60,10 +60,10 @@ class FeetError:
 class RetargetReport:
     """Result of retargeting a captured skeleton.
 
-    family: that of the joint names, empty if they were given. bones: in the body's order. feet: None if the
-    source has no ankles, or its feet are never on the ground. unused: joints of the source that move no joint
-    of the body. missing: joints that BAPs can turn, but the source lacks. found: how "bones", "up" and "rest"
-    were found, each with its confidence, in words.
+    family: of the joint names; empty for joints that the caller gave. bones: in the body's order. feet: None
+    if the source has no ankles, or its feet are never on the ground. unused: joints of the source that move
+    no joint of the body. missing: joints that BAPs can turn, but the source lacks. found: reason and
+    confidence of "bones", "up" and "rest", in words.
     """
 
     family: str
@@ -133,18 +133,18 @@ def measure_bones(
         end = min(begin + POSED_FRAMES, count)
         matrices = solver.pose(animation.body.values[begin:end])
         for column, (joint, aim) in enumerate(aims):
-            ours = matrices[:, order[aim], :3, 3] - matrices[:, order[joint], :3, 3]
-            theirs = positions[begin:end, mapped[aim]] - positions[begin:end, mapped[joint]]
+            body_bone = matrices[:, order[aim], :3, 3] - matrices[:, order[joint], :3, 3]
+            source_bone = positions[begin:end, mapped[aim]] - positions[begin:end, mapped[joint]]
             if joint in rest_alignment.neutral_joints():
-                bone = skeleton.centres[order[aim]] - skeleton.centres[order[joint]]
+                at_rest = skeleton.centres[order[aim]] - skeleton.centres[order[joint]]
                 frames_of_bone = rotations.matrices(turned[begin:end, mapped[joint]])
-                theirs = frames_of_bone @ (alignment.corrections[joint] @ bone)
-            angles[begin:end, column] = rotations.degrees_between(ours, theirs)
+                source_bone = frames_of_bone @ (alignment.corrections[joint] @ at_rest)
+            angles[begin:end, column] = rotations.degrees_between(body_bone, source_bone)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
-        own = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3])
-        has_feet = own is not None
-        if own is not None:
-            heights[:, begin:end] = own.lowest
+        body = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3])
+        has_feet = body is not None
+        if body is not None:
+            heights[:, begin:end] = body.lowest
     bones = tuple(
         BoneError(
             joint,
@@ -180,7 +180,7 @@ def _feet(source: soles.Soles, body: Float64, rate: float) -> FeetError | None:
     standing = above < MAX_GROUND_HEIGHT
     if not standing.any():
         return None
-    # the body's ground is at height 0, or at the source's: whichever its feet fit better
+    # the ground of the body is at height 0 or at the source's: its feet fit one of them better
     errors = [np.abs(body - floor - above)[standing] for floor in (np.zeros_like(level), level)]
     error = min(errors, key=lambda e: float(np.median(e)))
     return FeetError(

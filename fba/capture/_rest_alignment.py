@@ -7,11 +7,9 @@ point in the directions of the source's bones, whether its rest pose is a T, an 
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from itertools import pairwise
 
 import numpy as np
@@ -22,9 +20,10 @@ from fba.body import Skeleton
 from fba.capture._spine import joints as spine_joints
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
+from fba.source import read_table
 
-SHORT = 1e-6
-"""Share of the skeleton's size below which a bone has no direction."""
+MIN_BONE_LENGTH = 1e-6
+"""Smallest length of a bone that has a direction, as a share of the skeleton's size."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +31,11 @@ class Bone:
     """A row of bones.csv: how the bone that begins at a joint is aligned with the source's.
 
     base: joint whose alignment is rotated as little as possible, or "facing". aims: joints at the bone's
-    other end, of which the first mapped one counts. tip: the default posture's joint that a source bone
-    without a next joint points to. via: "down" if the rotation goes via a limb that hangs straight down, so
+    other end, of which the first that is mapped counts. tip: the default posture's joint to which a source
+    bone without a next joint points. via: "down" if the rotation goes via a limb that hangs straight down, so
     that T, A and standing rest poses give the same twist; "palm" if the row of knuckles gives the twist;
-    "neutral" if the bone of the rest pose counts as that of the default posture, wherever it points: each
-    maker lets clavicles begin elsewhere; "flat" if only its heading counts, since soles are flat at rest.
+    "neutral" if the bone at rest counts as that of the default posture, wherever it points, since clavicles
+    begin at other places in each source; "flat" if only its heading counts, since soles are flat at rest.
     """
 
     joint: str
@@ -49,17 +48,19 @@ class Bone:
 @cache
 def bones() -> tuple[Bone, ...]:
     """Return the bones of the limbs, parents first, left then right."""
-    text = (files(__package__) / "bones.csv").read_text(encoding="utf-8")
-    return tuple(
-        Bone(row["joint"], row["base"], tuple(row["aims"].split()), row["tip"], row["via"])
+    rows = [
+        {key: text.replace("?", side) for key, text in row.items()}
         for side in "lr"
-        for row in csv.DictReader(text.replace("?", side).splitlines())
+        for row in read_table(__package__, "bones.csv")
+    ]
+    return tuple(
+        Bone(row["joint"], row["base"], tuple(row["aims"].split()), row["tip"], row["via"]) for row in rows
     )
 
 
 @cache
 def neutral_joints() -> frozenset[str]:
-    """Return the joints whose bones count from where they are in the rest pose: clavicles and feet."""
+    """Return the joints whose bones at rest count as those of the default posture: clavicles and feet."""
     return frozenset(bone.joint for bone in bones() if bone.via in ("neutral", "flat"))
 
 
@@ -76,105 +77,122 @@ class Alignment:
 
 def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> Alignment:
     """Return the corrections of all mapped joints. ModelError without size, or left and right."""
-    rest = motion.rest()
-    size = float(np.ptp(rest, axis=0).max())
-    if size <= 0:
-        raise ModelError("the source's joints all coincide in its rest pose; it has no bones")
-    facing = _facing(rest, mapped)
-    ends = motion.end_offsets
-    short = SHORT * size
+    aligner = _Aligner(motion, mapped, skeleton)
+    aligner.align_spine()
+    for bone in bones():
+        if bone.joint in mapped:
+            aligner.align_limb(bone)
+    return Alignment(aligner.corrections, aligner.aims)
 
-    def default_position(joint: str) -> Float64:
-        position: Float64 = skeleton.centres[skeleton.number(joint)]
-        return position
 
-    corrections: dict[str, Float64] = {}
-    aims: dict[str, str] = {}
+class _Aligner:
+    """Finds the corrections of joints one by one, parents first. `facing` is the correction of the pelvis."""
 
-    def align_bone(joint: str, aim: str, start: Float64, via: str = "") -> Float64:
-        source = rest[mapped[aim]] - rest[mapped[joint]]
-        if np.linalg.norm(source) <= short:
+    def __init__(self, motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> None:
+        self.motion, self.mapped, self.skeleton = motion, mapped, skeleton
+        self.rest = motion.rest()
+        size = float(np.ptp(self.rest, axis=0).max())
+        if size <= 0:
+            raise ModelError("the source's joints all coincide in its rest pose; it has no bones")
+        self.shortest = MIN_BONE_LENGTH * size
+        self.facing = _facing(self.rest, mapped)
+        self.corrections: dict[str, Float64] = {"sacroiliac": self.facing}
+        self.aims: dict[str, str] = {}
+
+    def align_spine(self) -> None:
+        spine = [joint for joint in spine_joints(self.skeleton) if joint in self.mapped]
+        for joint, above in pairwise(spine):
+            self.corrections[joint] = self._align_bone(joint, above, self.facing)
+        self.corrections[spine[-1]] = self.corrections["sacroiliac"] = self.facing
+
+    def align_limb(self, bone: Bone) -> None:
+        start = self.corrections.get(bone.base, self.facing)
+        aim = next((aim for aim in bone.aims if aim in self.mapped), None)
+        if aim is None:
+            correction = self._align_last_bone(bone, start)
+        else:
+            correction = self._align_bone(bone.joint, aim, start, bone.via)
+            if bone.via == "neutral":
+                correction = self.facing
+            elif bone.via == "flat":
+                correction = self._level_foot(bone.joint, aim)
+            elif bone.via == "palm":
+                correction = self._turn_palm(bone.joint, aim, correction)
+        self.corrections[bone.joint] = correction
+
+    def _source_bone(self, joint: str, aim: str) -> Float64:
+        bone: Float64 = self.rest[self.mapped[aim]] - self.rest[self.mapped[joint]]
+        return bone
+
+    def _body_bone(self, joint: str, aim: str) -> Float64:
+        centres, number = self.skeleton.centres, self.skeleton.number
+        bone: Float64 = centres[number(aim)] - centres[number(joint)]
+        return bone
+
+    def _align_bone(self, joint: str, aim: str, start: Float64, via: str = "") -> Float64:
+        """Return the start, turned so that the body's bone points where the source's does."""
+        source = self._source_bone(joint, aim)
+        if np.linalg.norm(source) <= self.shortest:
             return start
-        aims[joint] = aim
-        bone = start @ (default_position(aim) - default_position(joint))
+        self.aims[joint] = aim
+        bone = start @ self._body_bone(joint, aim)
         if via == "down":
             down = np.array([0.0, -1.0, 0.0])
             return rotations.between(down, source) @ rotations.between(bone, down) @ start
         return rotations.between(bone, source) @ start
 
-    def level_foot(joint: str, aim: str) -> Float64:
-        theirs = rest[mapped[aim]] - rest[mapped[joint]]
-        ours = facing @ (default_position(aim) - default_position(joint))
-        if min(np.hypot(line[0], line[2]) for line in (theirs, ours)) <= short:
-            return facing
-        angle = np.arctan2(theirs[0], theirs[2]) - np.arctan2(ours[0], ours[2])
-        return rotations.turn(np.array([0.0, 1.0, 0.0]), np.array(angle)) @ facing
+    def _align_last_bone(self, bone: Bone, start: Float64) -> Float64:
+        """Return the start, turned so that a bone without a next joint points to the end of the source's."""
+        tips = self.motion.end_offsets[self.motion.end_parents == self.mapped[bone.joint]]
+        if not bone.tip or not len(tips):
+            return start
+        source = tips.mean(axis=0)
+        if np.linalg.norm(source) <= self.shortest:
+            return start
+        return rotations.between(start @ self._body_bone(bone.joint, bone.tip), source) @ start
 
-    def turn_palm(joint: str, aim: str) -> None:
+    def _level_foot(self, joint: str, aim: str) -> Float64:
+        """Return the correction of a flat sole: only the heading of the foot counts."""
+        source = self._source_bone(joint, aim)
+        body = self.facing @ self._body_bone(joint, aim)
+        if min(np.hypot(bone[0], bone[2]) for bone in (source, body)) <= self.shortest:
+            return self.facing
+        angle = np.arctan2(source[0], source[2]) - np.arctan2(body[0], body[2])
+        return rotations.turn(np.array([0.0, 1.0, 0.0]), np.array(angle)) @ self.facing
+
+    def _turn_palm(self, joint: str, aim: str, correction: Float64) -> Float64:
+        """Return the correction, turned about the hand's length so that the rows of knuckles agree."""
         side = joint[0]
-        one, other = (
-            f"{side}_index1",
-            next((f"{side}_{finger}1" for finger in ("pinky", "ring") if f"{side}_{finger}1" in mapped), ""),
-        )
-        if one not in mapped or not other or joint not in aims:
-            return
-        along = rest[mapped[aim]] - rest[mapped[joint]]
-        row = rest[mapped[other]] - rest[mapped[one]]
-        own = corrections[joint] @ (default_position(other) - default_position(one))
+        first = f"{side}_index1"
+        lasts = (f"{side}_{finger}1" for finger in ("pinky", "ring"))
+        last = next((knuckle for knuckle in lasts if knuckle in self.mapped), None)
+        if first not in self.mapped or last is None or joint not in self.aims:
+            return correction
+        along = self._source_bone(joint, aim)
         along = along / np.linalg.norm(along)
-        row, own = row - along * (along @ row), own - along * (along @ own)
-        if np.linalg.norm(row) <= short or np.linalg.norm(own) == 0:
-            return
-        angle = np.arctan2(np.cross(own, row) @ along, own @ row)
-        corrections[joint] = rotations.turn(along, np.array(angle)) @ corrections[joint]
-
-    spine = [joint for joint in spine_joints(skeleton) if joint in mapped]
-    for joint, above in pairwise(spine):
-        corrections[joint] = align_bone(joint, above, facing)
-    corrections[spine[-1]] = facing
-    corrections["sacroiliac"] = facing
-
-    for bone in bones():
-        if bone.joint not in mapped:
-            continue
-        start = corrections.get(bone.base, facing)
-        aim = next((aim for aim in bone.aims if aim in mapped), None)
-        if aim is not None:
-            corrections[bone.joint] = align_bone(bone.joint, aim, start, bone.via)
-            if bone.via == "neutral":
-                corrections[bone.joint] = facing
-            elif bone.via == "flat":
-                corrections[bone.joint] = level_foot(bone.joint, aim)
-            elif bone.via == "palm":
-                turn_palm(bone.joint, aim)
-            continue
-        corrections[bone.joint] = start
-        tips = ends[motion.end_parents == mapped[bone.joint]]
-        if bone.tip and len(tips):
-            source = tips.mean(axis=0)
-            if np.linalg.norm(source) > short:
-                turn = rotations.between(
-                    start @ (default_position(bone.tip) - default_position(bone.joint)), source
-                )
-                corrections[bone.joint] = turn @ start
-    return Alignment(corrections, aims)
+        source, body = self._source_bone(first, last), correction @ self._body_bone(first, last)
+        source, body = source - along * (along @ source), body - along * (along @ body)
+        if np.linalg.norm(source) <= self.shortest or np.linalg.norm(body) == 0:
+            return correction
+        angle = np.arctan2(np.cross(body, source) @ along, body @ source)
+        return rotations.turn(along, np.array(angle)) @ correction
 
 
 def scale(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> float | None:
     """Return the ratio of leg lengths of body and source, else of arm lengths; None without limbs."""
     positions = motion.rest()
     for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")):
-        ours = theirs = 0.0
+        body = source = 0.0
         for side in "lr":
             names = [f"{side}_{part}" for part in chain]
             if not all(name in mapped and name in skeleton for name in names):
                 continue
             for a, b in pairwise(names):
                 ends = skeleton.centres[[skeleton.number(a), skeleton.number(b)]]
-                ours += float(np.linalg.norm(ends[1] - ends[0]))
-                theirs += float(np.linalg.norm(positions[mapped[b]] - positions[mapped[a]]))
-        if theirs > 0:
-            return ours / theirs
+                body += float(np.linalg.norm(ends[1] - ends[0]))
+                source += float(np.linalg.norm(positions[mapped[b]] - positions[mapped[a]]))
+        if source > 0:
+            return body / source
     return None
 
 

@@ -1,8 +1,8 @@
-"""Correct a file's rest pose where the motion shows that it is not what it seems: clavicles and feet.
+"""Correct clavicles and feet of a file's rest pose by what the motion shows of them.
 
-Files agree on where limbs point at rest, but not on clavicles, which they raise for a T-pose or turn by a
-constant angle, and not on feet, which some draw level from the ankle, or rolled with straddled legs. In the
-default posture clavicles are as in someone whose arms hang, and soles are flat.
+Files agree on where limbs point at rest, but some raise clavicles for a T-pose or turn them by a constant
+angle, and some draw feet level from the ankle, or rolled with straddled legs. In the default posture
+clavicles are as in someone whose arms hang, and soles are flat.
 """
 
 from __future__ import annotations
@@ -17,34 +17,36 @@ from fba.capture import _standing as standing
 from fba.capture._rest_from_motion import LOW_ARM, mean_turn, with_rest
 from fba.capture.motion import SkeletonMotion
 
-FRAMES = 1000
-"""Frames that are looked at."""
-FEWEST_LOW = 3
-"""Number of frames with a hanging arm that shows how the clavicle rests."""
-OWN_CLAVICLE = 5.0
-"""Degrees by which clavicles of somebody whose arms hang may differ from the rest pose: the posture of a
-person. What exceeds this is the skeleton's."""
-SLOW = 0.15
-"""Speed of a foot, in sizes of the skeleton per second, up to which it may stand."""
-STEADY = 8.0
-"""Degrees within which standing feet are turned alike."""
-MIRRORED = 9.0
-"""Degrees within which the left foot's correction is the mirror image of the right one's."""
-MOST_TURN = 40.0
+MAX_FRAMES = 1000
+"""Largest number of frames, spread evenly over the motion, that are examined."""
+MIN_HANGING_FRAMES = 3
+"""Smallest number of frames with a hanging arm that show how the clavicle rests."""
+MAX_PERSONAL_TURN = 5.0
+"""Largest angle, in degrees, between clavicles with hanging arms and at rest that is due to the person's
+posture. The rest of a larger angle is due to the skeleton."""
+MAX_STANDING_SPEED = 0.15
+"""Largest speed of a standing foot, in sizes of the skeleton per second."""
+MAX_STANDING_TURN = 8.0
+"""Largest angle, in degrees, between the rotations of a standing foot."""
+MAX_ASYMMETRY = 9.0
+"""Largest difference, in degrees, between the correction of a foot and the mirror image of the other's."""
+FOOT_TURN_RANGE = (2.0, 40.0)
+"""Smallest and largest correction of a foot, in degrees: less is noise, and more is another rest pose."""
 USUAL_SLOPE = -27.0
-"""Degrees from level at which feet point from ankle to ball, on average of many skeletons."""
+"""Average slope of feet from ankle to ball over many skeletons, in degrees from level."""
+UP = np.array([0.0, 1.0, 0.0])
 
 
 def correct_rest(motion: SkeletonMotion, mapped: Mapping[str, int]) -> SkeletonMotion:
     """Return a motion, y up, whose rest pose has clavicles as with hanging arms, and flat feet."""
-    rows = motion.spread(FRAMES)
-    few = motion.select(rows)
-    quaternions, positions = few.world()
+    rows = motion.spread(MAX_FRAMES)
+    sample = motion.select(rows)
+    quaternions, positions = sample.world()
     turned = rotations.matrices(quaternions)
     rest = np.tile(np.eye(3), (len(motion.names), 1, 1))
     for side in "lr":
-        _correct_clavicle(side, few, mapped, turned, positions, rest)
-    _correct_feet(few, mapped, turned, positions, rows, rest)
+        _correct_clavicle(side, sample, mapped, turned, positions, rest)
+    _correct_feet(sample, mapped, turned, positions, rows, rest)
     return motion if (rest == np.eye(3)).all() else with_rest(motion, rest)
 
 
@@ -59,12 +61,12 @@ def _correct_clavicle(
     arm = rotations.unit(positions[:, elbow] - positions[:, shoulder])
     low = np.flatnonzero(arm[:, 1] < -LOW_ARM)
     above = int(motion.parents[inner])
-    if above < 0 or len(low) < FEWEST_LOW:
+    if above < 0 or len(low) < MIN_HANGING_FRAMES:
         return
     turn = mean_turn(turned, above, inner, low)
     angle = float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1.0, 1.0))))
-    if angle > OWN_CLAVICLE:
-        rest[inner] = rotations.part(np.eye(3), turn, 1.0 - OWN_CLAVICLE / angle)
+    if angle > MAX_PERSONAL_TURN:
+        rest[inner] = rotations.part(np.eye(3), turn, 1.0 - MAX_PERSONAL_TURN / angle)
 
 
 def _correct_feet(
@@ -83,41 +85,26 @@ def _correct_feet(
         height = positions[:, ankle, 1]
         low = np.flatnonzero(height <= np.median(height))
         still = low[np.argsort(speed[low], kind="stable")][: max(1, len(low) // 3)]
-        if speed[still].max() > SLOW:
+        if speed[still].max() > MAX_STANDING_SPEED:
             return
         up = turned[still, ankle][:, 1].mean(axis=0)  # world up as the foot sees it
-        if np.degrees(np.arccos(np.clip(np.linalg.norm(up), 0.0, 1.0))) > STEADY:
+        if np.degrees(np.arccos(np.clip(np.linalg.norm(up), 0.0, 1.0))) > MAX_STANDING_TURN:
             return
         ups.append(rotations.unit(up))
     facing = standing.measure(at_rest[None], mapped)
-    ahead, left = np.cross(facing.left[0], [0.0, 1.0, 0.0]), facing.left[0]
+    ahead, left = np.cross(facing.left[0], UP), facing.left[0]
     pitch = [float(np.degrees(np.arctan2(up @ ahead, up[1]))) for up in ups]
     roll = [float(np.degrees(np.arctan2(up @ left, up[1]))) for up in ups]
-    pitches = abs(pitch[0] - pitch[1]) < MIRRORED
-    rolls = abs(roll[0] + roll[1]) < MIRRORED
-    for number, side in enumerate("lr"):
+    mean_pitch = sum(pitch) / 2 if abs(pitch[0] - pitch[1]) < MAX_ASYMMETRY else 0.0
+    mean_roll = (roll[0] - roll[1]) / 2 if abs(roll[0] + roll[1]) < MAX_ASYMMETRY else 0.0
+    for side, own_roll in (("l", mean_roll), ("r", -mean_roll)):
         ankle, toe = mapped[f"{side}_ankle"], mapped.get(f"{side}_metatarsal")
-        mean_pitch, mean_roll = sum(pitch) / 2, (roll[0] - roll[1]) / 2 * (1 if number == 0 else -1)
-        if not pitches or toe is None:
-            mean_pitch = 0.0
-        elif toe is not None:
+        own_pitch = 0.0
+        if toe is not None:
             bone = at_rest[toe] - at_rest[ankle]
             slope = float(np.degrees(np.arctan2(bone[1], bone @ ahead)))
-            if abs(slope + mean_pitch - USUAL_SLOPE) > abs(slope - USUAL_SLOPE):
-                mean_pitch = 0.0
-        if not rolls:
-            mean_roll = 0.0
-        if max(abs(mean_pitch), abs(mean_roll)) > MOST_TURN or max(abs(mean_pitch), abs(mean_roll)) < 2.0:
-            continue
-        up = (
-            np.array([0.0, 1.0, 0.0])
-            + np.tan(np.radians(mean_pitch)) * ahead
-            + np.tan(np.radians(mean_roll)) * left
-        )
-        turn = rotations.between(up, np.array([0.0, 1.0, 0.0]))
-        for joint in range(ankle, len(motion.names)):
-            above = joint
-            while above > ankle:
-                above = int(motion.parents[above])
-            if above == ankle:
-                rest[joint] = turn
+            if abs(slope + mean_pitch - USUAL_SLOPE) <= abs(slope - USUAL_SLOPE):
+                own_pitch = mean_pitch
+        if FOOT_TURN_RANGE[0] <= max(abs(own_pitch), abs(own_roll)) <= FOOT_TURN_RANGE[1]:
+            up = UP + np.tan(np.radians(own_pitch)) * ahead + np.tan(np.radians(own_roll)) * left
+            rest[motion.descendants(ankle)] = rotations.between(up, UP)

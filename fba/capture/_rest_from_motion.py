@@ -1,10 +1,10 @@
-"""Find a rest pose from a motion, where the file's own says nothing: all bones along +x, or any pose.
+"""Find a rest pose from a motion, where the file's rest pose says nothing: all bones along +x, or any pose.
 
-Each joint has axes of its own, in which its bone and its neighbours lie. How a person has to stand so that
-these axes are those of the default posture follows from the motion: elbows and knees bend about one axis
-only, which is fixed in both their bones; hips and shoulders are rows from left to right; a head and a pelvis
-are upright and look ahead while somebody stands. Makers of skeletons let axes lie exactly along or across
-bones, so a direction close to an axis is that axis.
+Each joint has axes, relative to which its bone and its neighbours lie. The motion shows which of them are the
+axes of the default posture: elbows and knees bend about a single axis, which is fixed in both of their bones;
+hips and shoulders are rows from left to right; a head and a pelvis are upright and look ahead while somebody
+stands. In most skeletons axes lie exactly along or across bones, so a direction close to an axis is that
+axis.
 """
 
 from __future__ import annotations
@@ -19,34 +19,34 @@ from fba.arrays import Bool, Float64, Intp
 from fba.body import Skeleton
 from fba.body.skeleton import ROOT
 from fba.capture import _standing as standing
+from fba.capture._named_bones import FINGERS
 from fba.capture._rest_alignment import bones
 from fba.capture._spine import joints as spine_joints
 from fba.capture.motion import SkeletonMotion
 from fba.geometry import nearest_rotation
 
-FRAMES = 400
-"""Frames that are looked at."""
 STANDING_SHARE = 0.25
 """Share of the frames that count as standing: those closest to it."""
-CLOSE_AXIS = 20.0
-"""Degrees within which a direction is taken for a joint's own axis."""
-SAME_AXIS = 45.0
-"""The same, if it is the axis that the bone above has."""
-EXACT_AXIS = 5.0
-"""The same for directions that are known from positions of joints."""
-ON_AXES = 0.65
-"""Share of directions close to axes, of which random ones would be almost half, that is evidence enough."""
-MOST_BEND = 0.5
-"""Share of elbows and knees that have to bend for that."""
-LEAST_BEND = 0.15
-"""Sine of the bend of an elbow or a knee above which it shows the axis."""
+MAX_AXIS_ANGLE = 20.0
+"""Largest angle, in degrees, between a direction and the joint's axis that it is taken for."""
+MAX_INHERITED_ANGLE = 45.0
+"""The same where the bone above has this axis."""
+MAX_EXACT_ANGLE = 5.0
+"""The same for directions that positions of joints give."""
+MIN_AXES_SHARE = 0.65
+"""Smallest share of directions close to axes that is evidence: of random directions, almost half are."""
+MIN_HINGED_SHARE = 0.5
+"""Smallest share of elbows and knees that must show their axes for that."""
+MIN_BEND = 0.15
+"""Smallest sine of the bend of an elbow or a knee that shows the axis."""
 LOW_ARM = 0.6
-"""Cosine of the angle between an upper arm and straight down below which its clavicle is at rest."""
+"""Smallest cosine of the angle between an upper arm and straight down at which its clavicle is at rest."""
+X, Y, Z = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
 class FoundRest:
-    """A motion with another rest pose, the default posture. confidence: 0 to 1. reason: for it."""
+    """A motion whose rest pose is the default posture. confidence: 0 to 1. reason: of the confidence."""
 
     motion: SkeletonMotion
     confidence: float
@@ -54,12 +54,11 @@ class FoundRest:
 
 
 def rest_from_motion(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> FoundRest:
-    """Return a motion, y up, with a rest pose that was found from the motion itself.
+    """Return a motion, y up, with the rest pose that it shows.
 
     mapped: joint of the body -> number of the source's joint.
     """
-    few = motion.select(motion.spread(FRAMES))
-    return _Finder(few, mapped, skeleton).apply(motion)
+    return _Finder(motion.select(motion.spread()), mapped, skeleton).apply(motion)
 
 
 class _Finder:
@@ -71,11 +70,12 @@ class _Finder:
         self.turned = rotations.matrices(turned)  # (T, J, 3, 3)
         self.axes = rotations.matrices(motion.axes)
         stance = standing.measure(self.positions, mapped)
-        tilt = rotations.degrees_between(stance.up, np.array([0.0, 1.0, 0.0]))
+        tilt = rotations.degrees_between(stance.up, Y)
         self.distance = np.hypot(stance.distance, tilt)
         count = max(1, round(STANDING_SHARE * len(self.distance)))
         self.standing: Intp = np.argsort(self.distance, kind="stable")[:count].astype(np.intp)
         self.left = stance.left
+        self.upright = np.broadcast_to(Y, self.left.shape)
         self.rest: dict[int, Float64] = {}
         self.evidence: list[float] = []
         self.on_axes: list[bool] = []
@@ -90,17 +90,13 @@ class _Finder:
         bend = float(np.mean(self.evidence)) if self.evidence else 0.0
         exact = float(np.mean(self.on_axes)) if self.on_axes else 0.0
         confidence = 1.3 - away / 60.0
-        if (
-            bend >= MOST_BEND
-        ):  # directions that are axes show that they are right, however little people stand
-            confidence = max(confidence, 0.5 + 1.25 * (exact - ON_AXES))
+        if bend >= MIN_HINGED_SHARE:  # directions along axes confirm each other, even if nobody stands
+            confidence = max(confidence, 0.5 + 1.25 * (exact - MIN_AXES_SHARE))
         reason = (
             f"{100 * exact:.0f} % of directions are axes of joints, {100 * bend:.0f} % of elbows and knees "
             f"bend, people stand to within {away:.0f} degrees"
         )
         return FoundRest(with_rest(motion, rest), float(np.clip(confidence, 0.0, 0.6 + 0.4 * bend)), reason)
-
-    # directions in the axes of a joint
 
     def _local(self, joint: int, directions: Float64, rows: Intp | Bool | slice = slice(None)) -> Float64:
         """Return the mean of world directions (T, 3), unit, as a joint sees it; may be short."""
@@ -109,12 +105,12 @@ class _Finder:
         return result
 
     def _snap(self, joint: int, direction: Float64, within: float, like: Float64 | None = None) -> Float64:
-        """Return a direction (3,), or the joint's own axis that is closest, if it is within some degrees.
+        """Return a direction (3,), or the joint's axis closest to it, if that is within some degrees.
 
-        like: axis of the bone above, which counts within `SAME_AXIS`.
+        like: axis of the bone above; the same axis counts within `MAX_INHERITED_ANGLE`.
         """
         direction = rotations.unit(direction)
-        axes = self.axes[joint].T  # rows: the joint's own axes
+        axes = self.axes[joint].T  # rows: the joint's axes
         sizes = axes @ direction
         best = int(np.argmax(np.abs(sizes)))
         axis: Float64 = axes[best] * np.sign(sizes[best])
@@ -122,7 +118,11 @@ class _Finder:
         self.on_axes.append(angle <= within)
         if angle <= within:
             return axis
-        if like is not None and angle <= SAME_AXIS and float(rotations.degrees_between(axis, like)) < 1.0:
+        if (
+            like is not None
+            and angle <= MAX_INHERITED_ANGLE
+            and float(rotations.degrees_between(axis, like)) < 1.0
+        ):
             return axis
         return direction
 
@@ -141,15 +141,11 @@ class _Finder:
         centres, number = self.skeleton.centres, self.skeleton.number
         return rotations.unit(centres[number(aim)] - centres[number(joint)])
 
-    def _set(self, joint: int, own: tuple[Float64, Float64], body: tuple[Float64, Float64]) -> None:
-        """Let two directions of a joint, the first exactly, be two of the body in the default posture."""
-        self.rest[joint] = _frame(*body) @ _frame(*own).T
-
-    # parts of the body
+    def _set(self, joint: int, seen: tuple[Float64, Float64], body: tuple[Float64, Float64]) -> None:
+        """Let directions in a joint's axes be those of the body in the default posture, the first exactly."""
+        self.rest[joint] = _frame(*body) @ _frame(*seen).T
 
     def _trunk(self) -> None:
-        x, y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-        upright = np.broadcast_to(y, self.left.shape)
         shoulders = self._row("shoulder")
         chest = self._row("sternoclavicular")
         rows = {"hips": self.left, "chest": shoulders if shoulders is not None else self.left}
@@ -164,23 +160,20 @@ class _Finder:
                 left = self._local(number, chest)
             else:
                 left = self._local(number, row, slice(None) if rigid else self.standing)
-            left = self._snap(number, left, EXACT_AXIS if rigid else CLOSE_AXIS)
-            if joint == ROOT or joint == spine[-1]:
-                up = self._snap(number, self._local(number, upright, self.standing), CLOSE_AXIS)
-                self._set(number, (left, up), (x, y))
-                continue
-            above = spine[position + 1]
-            bone = self._bone(joint, above)
+            left = self._snap(number, left, MAX_EXACT_ANGLE if rigid else MAX_AXIS_ANGLE)
+            bone = None if joint in (ROOT, spine[-1]) else self._bone(joint, spine[position + 1])
             if bone is None:
-                up = self._snap(number, self._local(number, upright, self.standing), CLOSE_AXIS)
-                self._set(number, (left, up), (x, y))
+                self._set_upright(number, left)
             else:
-                self._set(number, (bone[1], left), (self._default(joint, above), x))
+                self._set(number, (bone[1], left), (self._default(joint, bone[0]), X))
         if "sacroiliac" in self.mapped and self.mapped["sacroiliac"] not in self.rest:
             number = self.mapped["sacroiliac"]
-            left = self._snap(number, self._local(number, self.left), EXACT_AXIS)
-            up = self._snap(number, self._local(number, upright, self.standing), CLOSE_AXIS)
-            self._set(number, (left, up), (x, y))
+            self._set_upright(number, self._snap(number, self._local(number, self.left), MAX_EXACT_ANGLE))
+
+    def _set_upright(self, joint: int, left: Float64) -> None:
+        """Let the direction to the left and the mean of what is up while somebody stands be those at rest."""
+        up = self._snap(joint, self._local(joint, self.upright, self.standing), MAX_AXIS_ANGLE)
+        self._set(joint, (left, up), (X, Y))
 
     def _row(self, joint: str) -> Float64 | None:
         """Return unit (T, 3), from a joint on the right to that on the left; None if they coincide."""
@@ -193,19 +186,15 @@ class _Finder:
         return rotations.unit(line)
 
     def _limbs(self) -> None:
-        x = np.array([1.0, 0.0, 0.0])
         for side in "lr":
-            for upper, lower, end, sign in (
-                ("shoulder", "elbow", "wrist", -1.0),
-                ("hip", "knee", "ankle", 1.0),
-            ):
-                self._hinge(f"{side}_{upper}", f"{side}_{lower}", f"{side}_{end}", sign * x)
+            self._hinge(f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist", -X)
+            self._hinge(f"{side}_hip", f"{side}_knee", f"{side}_ankle", X)
             self._hand(side)
             self._foot(side)
             self._clavicle(side)
         for side in "lr":
             for bone in bones():
-                if bone.joint.startswith(side) and bone.joint[2:-1] in FINGER_NAMES:
+                if bone.joint.startswith(side) and bone.joint[2:-1] in FINGERS:
                     self._finger(bone.joint, bone.aims, side)
 
     def _hinge(self, upper: str, lower: str, end: str, axis: Float64) -> None:
@@ -214,7 +203,9 @@ class _Finder:
         if first is None:
             return
         high = self.mapped[upper]
-        mean = self._snap(high, self._local(high, self.left * np.sign(axis[0]), self.standing), CLOSE_AXIS)
+        mean = self._snap(
+            high, self._local(high, self.left * np.sign(axis[0]), self.standing), MAX_AXIS_ANGLE
+        )
         if second is None:
             self._set(high, (first[1], mean), (self._default(upper, lower), axis))
             return
@@ -223,19 +214,19 @@ class _Finder:
         shank = rotations.unit(self.positions[:, self.mapped[end]] - self.positions[:, low])
         bend = np.cross(thigh, shank)  # longer where the bend is clearer
         sines = np.linalg.norm(bend, axis=1)
-        clear = sines > LEAST_BEND
+        clear = sines > MIN_BEND
         local = self._local(high, bend, clear) if clear.any() else np.zeros(3)
         spread = float(np.linalg.norm(local) / max(sines[clear].mean(), 1e-9)) if clear.any() else 0.0
         hinged = clear.sum() >= 1 and spread > 0.8
         self.evidence.append(float(hinged))
-        seen = self._snap(high, _across(local, first[1]), CLOSE_AXIS, mean) if hinged else mean
+        seen = self._snap(high, _across(local, first[1]), MAX_AXIS_ANGLE, mean) if hinged else mean
         self._set(high, (first[1], seen), (self._default(upper, lower), axis))
-        # the forearm may also turn about its length: its axis is the one of the bone above, on average
+        # the forearm may also turn about its length: on average its axis is that of the bone above
         above = self.turned[:, high] @ seen
         like = _other_axes(self.axes[high], seen, self.axes[low])
         mean_low = self._local(low, bend, clear) if hinged else self._local(low, above)
-        known = self._snap(low, _across(mean_low, second[1]), CLOSE_AXIS, like)
-        self._set(low, (second[1], known), (self._default(lower, end), axis))
+        seen_low = self._snap(low, _across(mean_low, second[1]), MAX_AXIS_ANGLE, like)
+        self._set(low, (second[1], seen_low), (self._default(lower, end), axis))
 
     def _hand(self, side: str) -> None:
         wrist, elbow = f"{side}_wrist", f"{side}_elbow"
@@ -257,42 +248,40 @@ class _Finder:
                 (self._default(wrist, bone[0]), self._default(f"{side}_index1", line[0])),
             )
             return
-        axis = np.array([-1.0, 0.0, 0.0])
-        hinge = self.rest[above].T @ axis  # as the forearm sees it
+        hinge = self.rest[above].T @ -X  # as the forearm sees it
         like = _other_axes(self.axes[above], hinge, self.axes[number])
-        seen = self._snap(number, self._local(number, self.turned[:, above] @ hinge), CLOSE_AXIS, like)
+        seen = self._snap(number, self._local(number, self.turned[:, above] @ hinge), MAX_AXIS_ANGLE, like)
         if bone is not None:
             along, body = bone[1], self._default(wrist, bone[0])
         elif len(ends) and np.linalg.norm(ends.mean(axis=0)) > 0:
             along, body = rotations.unit(ends.mean(axis=0)), self._default(wrist, f"{side}_middle1")
         else:
             forearm = rotations.unit(self.positions[:, number] - self.positions[:, above])
-            along = self._snap(number, self._local(number, forearm), CLOSE_AXIS)
+            along = self._snap(number, self._local(number, forearm), MAX_AXIS_ANGLE)
             body = self._default(wrist, f"{side}_middle1")
-        self._set(number, (along, seen), (body, axis))
+        self._set(number, (along, seen), (body, -X))
 
     def _foot(self, side: str) -> None:
         """Take feet as flat while somebody stands."""
         ankle, toe = f"{side}_ankle", f"{side}_metatarsal"
         if ankle not in self.mapped:
             return
-        number, x = self.mapped[ankle], np.array([1.0, 0.0, 0.0])
+        number = self.mapped[ankle]
         height = self.positions[:, number, 1]
         low = np.argsort(height, kind="stable")[: max(1, len(height) // 2)].astype(np.intp)
-        if len(height) > 1:  # of low feet, those that turn least are flat, not on heel or toes
+        if len(height) > 1:  # low feet that hardly turn are flat, not on heel or toes
             swing = np.linalg.norm(np.gradient(self.turned[:, number], axis=0), axis=(1, 2))
             low = low[np.argsort(swing[low], kind="stable")][: max(1, len(low) // 3)]
-        upright = np.broadcast_to([0.0, 1.0, 0.0], self.left.shape)
-        up = self._local(number, upright, low)
+        up = self._local(number, self.upright, low)
         bone = self._bone(ankle, toe)
         if bone is not None:
             body = self._default(ankle, toe) * [1.0, 0.0, 1.0]
-            self._set(number, (up, bone[1]), (np.array([0.0, 1.0, 0.0]), body))
+            self._set(number, (up, bone[1]), (Y, body))
             other = self.mapped[toe]
             self.rest[other] = self.rest[number] @ mean_turn(self.turned, number, other, low)
         else:
             left = self._local(number, self.left, low)
-            self._set(number, (up, left), (np.array([0.0, 1.0, 0.0]), x))
+            self._set(number, (up, left), (Y, X))
 
     def _clavicle(self, side: str) -> None:
         """Take the clavicle as in the default posture while the arm hangs."""
@@ -300,7 +289,7 @@ class _Finder:
         if inner not in self.mapped:
             return
         number = self.mapped[inner]
-        above = self._known_above(number)
+        above = self._nearest_above(number)
         rows = self.standing
         if shoulder in self.mapped and elbow in self.mapped:
             arm = rotations.unit(
@@ -316,11 +305,11 @@ class _Finder:
         if joint not in self.mapped or wrist not in self.rest:
             return
         number = self.mapped[joint]
-        flexion = self.rest[wrist].T @ np.array([0.0, 0.0, 1.0])
+        flexion = self.rest[wrist].T @ Z
         across = self._local(number, self.turned[:, wrist] @ flexion)
         bone = self._bone(joint, *aims)
         if bone is not None:
-            self._set(number, (bone[1], across), (self._default(joint, bone[0]), np.array([0.0, 0.0, 1.0])))
+            self._set(number, (bone[1], across), (self._default(joint, bone[0]), Z))
 
     def _others(self) -> None:
         """Give joints without a counterpart the mean of their turns against the joint above."""
@@ -332,20 +321,18 @@ class _Finder:
                     (n for n, p in enumerate(self.motion.parents) if int(p) == number and n in self.rest),
                     None,
                 )
-                known = child if child is not None else self.mapped[ROOT]
-                self.rest[number] = self.rest[known] @ mean_turn(self.turned, known, number, self.standing)
+                near = child if child is not None else self.mapped[ROOT]
+                self.rest[number] = self.rest[near] @ mean_turn(self.turned, near, number, self.standing)
             else:
                 turn = mean_turn(self.turned, int(parent), number, self.standing)
                 self.rest[number] = self.rest[int(parent)] @ turn
 
-    def _known_above(self, joint: int) -> int | None:
+    def _nearest_above(self, joint: int) -> int | None:
+        """Return the nearest joint above whose rest rotation is set."""
         while (joint := int(self.motion.parents[joint])) >= 0:
             if joint in self.rest:
                 return joint
         return None
-
-
-FINGER_NAMES = ("thumb", "index", "middle", "ring", "pinky")
 
 
 def with_rest(motion: SkeletonMotion, rest: Float64) -> SkeletonMotion:
@@ -373,7 +360,7 @@ def with_rest(motion: SkeletonMotion, rest: Float64) -> SkeletonMotion:
 
 
 def _frame(first: Float64, second: Float64) -> Float64:
-    """Return axes as columns (3, 3): the first direction, the second made square to it, and their product."""
+    """Return axes as columns (3, 3): the first direction, the second made perpendicular, their product."""
     a = rotations.unit(first)
     b = second - a * (a @ second)
     if np.linalg.norm(b) < 1e-6:
@@ -383,13 +370,12 @@ def _frame(first: Float64, second: Float64) -> Float64:
 
 
 def _across(direction: Float64, bone: Float64) -> Float64:
-    """Return the part of a direction that is square to a bone."""
-    result: Float64 = rotations.unit(direction - bone * (bone @ direction))
-    return result
+    """Return the part of a direction that is perpendicular to a bone."""
+    return rotations.unit(direction - bone * (bone @ direction))
 
 
 def _other_axes(axes: Float64, direction: Float64, others: Float64) -> Float64 | None:
-    """Return another joint's axis of the same name as a direction, if that is an axis; else None."""
+    """Return the axis of another joint with the same name as this direction; None if it is no axis."""
     sizes = axes.T @ direction
     best = int(np.argmax(np.abs(sizes)))
     if abs(sizes[best]) < np.cos(np.radians(1.0)):

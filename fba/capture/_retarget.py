@@ -29,17 +29,17 @@ ORIGINS: tuple[Origin, ...] = get_args(Origin)
 GROUNDS: tuple[Ground, ...] = get_args(Ground)
 SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spine.GROUPS}
 HINGES = (("shoulder", "elbow"), ("hip", "knee"))
-LOOSE = 1e-3
-"""Weight of staying close to the source's angles, relative to a bone's direction."""
-STIFF = {"thumb": 0.3, "index": 0.1, "middle": 0.1, "ring": 0.1, "pinky": 0.1}
+SWING_WEIGHT = 1e-3
+"""Weight of staying close to the source's angles, relative to that of a bone's direction."""
+FINGER_WEIGHTS = {"thumb": 0.3, "index": 0.1, "middle": 0.1, "ring": 0.1, "pinky": 0.1}
 """The same for fingers, which are often straight: the weight keeps their knuckles from turning far. That of
-thumbs is larger: each source bends them in another plane, and to point exactly as in the source, they would
-need angles that thumbs do not reach and the standard's I planes do not carry."""
+thumbs is larger, as sources bend them in different planes: to point exactly as in the source, they would need
+angles that thumbs do not reach and the standard's I planes do not carry."""
 FOREARM_SHARE = 0.5
 """Share of the hand's twist that the forearm takes, whose radius and ulna turn about each other."""
-FOREARM_SPEED = 10.0
-"""Radians per second at which a forearm twists at most. Hands that flip faster, as where angles of a capture
-change sides, do so at the wrist."""
+MAX_FOREARM_SPEED = 10.0
+"""Largest speed of a forearm's twist, in radians per second. Hands that flip faster, as where angles of a
+capture change sides, do so at the wrist."""
 MAX_HIP_OFFSET = 1e-4
 """Largest distance of the hips from their places in the pelvis, as a share of the distance between them."""
 CLAVICLE_SHARE = 0.5
@@ -62,9 +62,9 @@ class SkeletonOptions:
 
     spine: "spread" divides the spine's rotations between the vertebrae of groups Spine1 and Spine2 and those
     of the source's joints, "full" between all vertebrae; both keep the directions of the source's bones
-    exactly. "simple" turns the four vertebrae of group Spine1 only, a number those of the groups Spine1 up to
-    that one: these keep the rotation of the head, and the rest as closely as possible. "joints" turns one
-    vertebra for each joint of the source.
+    exactly. "simple" turns the four vertebrae of group Spine1 only, a number those of Spine1 and the next
+    groups, that many in all: both keep the rotation of the head, and the rest as closely as possible.
+    "joints" turns a vertebra for each joint of the source.
 
     joints: source joint name -> joint of the standard, in place of what the motion declares and of the
     built-in families of names. rest, up: the rest pose and the axis that points up; by default both are
@@ -94,7 +94,7 @@ class SkeletonOptions:
 
     @property
     def groups(self) -> int:
-        """Groups of vertebrae that share the spine's rotations; -1 for what is no choice."""
+        """Number of groups of vertebrae that share the spine's rotations; -1 for a wrong choice."""
         if isinstance(self.spine, str):
             return SPINES.get(self.spine, -1)
         return self.spine if isinstance(self.spine, int) else -1
@@ -118,7 +118,7 @@ def find_targets(
     source_rotations, source_positions = motion.world()
     turned: dict[str, Float64] = {}
     for joint, correction in alignment.corrections.items():
-        source = mapped.get(joint, mapped["HumanoidRoot"])
+        source = mapped.get(joint, mapped[ROOT])
         turned[joint] = rotations.matrices(source_rotations[:, source]) @ correction
     _turn_pelvis(motion, mapped, source_rotations, source_positions, turned)
     anchors = [joint for joint in spine.joints(skeleton) if joint in mapped]
@@ -200,7 +200,7 @@ def _swing(targets: Targets, joint: str) -> None:
     wanted = rotations.inside(above, targets.direction(joint))
     start = targets.closest_angles(joint, np.swapaxes(above, 1, 2) @ targets.rotations[joint])
     bone = targets.bone(joint, targets.aims[joint])
-    angles = bone_ik.aim(axes, start, bone, wanted, np.full(len(axes), LOOSE))
+    angles = bone_ik.aim(axes, start, bone, wanted, np.full(len(axes), SWING_WEIGHT))
     targets.rotations[joint] = above @ bone_ik.product(axes, angles)
 
 
@@ -239,13 +239,15 @@ def _turn_clavicle(targets: Targets, side: str) -> None:
     above = targets.parent_rotation(inner)
     turn = targets.closest_angles(inner, np.swapaxes(above, 1, 2) @ targets.rotations[inner])
     start = np.concatenate([turn * CLAVICLE_SHARE, turn * (1 - CLAVICLE_SHARE)], axis=1)
-    own = turn.shape[1]
+    inner_axes = turn.shape[1]
     target = bone_ik.Target(
-        ((pieces[0], own), (pieces[1], len(axes))), rotations.inside(above, targets.direction(inner))
+        ((pieces[0], inner_axes), (pieces[1], len(axes))), rotations.inside(above, targets.direction(inner))
     )
-    angles = bone_ik.aim_all(axes, start, (target,), np.full(len(axes), LOOSE))
-    targets.rotations[inner] = above @ bone_ik.product(axes[:own], angles[:, :own])
-    targets.rotations[outer] = targets.rotations[inner] @ bone_ik.product(axes[own:], angles[:, own:])
+    angles = bone_ik.aim_all(axes, start, (target,), np.full(len(axes), SWING_WEIGHT))
+    targets.rotations[inner] = above @ bone_ik.product(axes[:inner_axes], angles[:, :inner_axes])
+    targets.rotations[outer] = targets.rotations[inner] @ bone_ik.product(
+        axes[inner_axes:], angles[:, inner_axes:]
+    )
 
 
 def _twist_forearm(targets: Targets, side: str) -> None:
@@ -255,7 +257,7 @@ def _twist_forearm(targets: Targets, side: str) -> None:
         return
     bone = targets.bone(elbow, wrist)
     twist = hinges.turn_about(np.swapaxes(targets.rotations[elbow], 1, 2) @ targets.rotations[wrist], bone)
-    share = _slow_down(FOREARM_SHARE * twist, FOREARM_SPEED / float(targets.motion.rate))
+    share = _slow_down(FOREARM_SHARE * twist, MAX_FOREARM_SPEED / float(targets.motion.rate))
     targets.rotations[elbow] = targets.rotations[elbow] @ rotations.turn(bone, share)
 
 
@@ -283,37 +285,34 @@ def _curl_finger(targets: Targets, finger: str) -> None:
     axes: list[Float64] = []
     starts: list[Float64] = []
     goals = []
-    pieces: tuple[tuple[Float64, int], ...]
     before = above
     for joint in joints:
-        own, *_ = targets.axes(joint)
-        axes.extend(own)
+        axes.extend(targets.axes(joint)[0])
         starts.append(targets.closest_angles(joint, np.swapaxes(before, 1, 2) @ targets.rotations[joint]))
         before = targets.rotations[joint]
-        pieces = ((targets.bone(joint, targets.aims[joint]), len(axes)),)
-        goals.append(bone_ik.Target(pieces, rotations.inside(above, targets.direction(joint))))
+        piece = (targets.bone(joint, targets.aims[joint]), len(axes))
+        goals.append(bone_ik.Target((piece,), rotations.inside(above, targets.direction(joint))))
     turned = np.array(axes)
     start = np.concatenate(starts, axis=1)
-    angles = bone_ik.aim_all(turned, start, goals, np.full(len(turned), STIFF[finger[2:]]))
+    angles = bone_ik.aim_all(turned, start, goals, np.full(len(turned), FINGER_WEIGHTS[finger[2:]]))
     used = 0
     frame = above
-    for joint, own_angles in zip(joints, starts, strict=True):
-        count = own_angles.shape[1]
-        frame = frame @ bone_ik.product(turned[used : used + count], angles[:, used : used + count])
+    for joint, joint_angles in zip(joints, starts, strict=True):
+        part = slice(used, used + joint_angles.shape[1])
+        frame = frame @ bone_ik.product(turned[part], angles[:, part])
         targets.rotations[joint] = frame
-        used += count
+        used = part.stop
 
 
 def _root_positions(targets: Targets, scale: float) -> Float64:
     """Return positions (T, 3) of the root for which the middle of the hips is where the source's is."""
     centres, number = targets.skeleton.centres, targets.skeleton.number
-    hips = [j for j in ("l_hip", "r_hip") if j in targets.mapped]
-    if len(hips) == 2 and "sacroiliac" in targets.skeleton:
-        middle = targets.source_positions[:, [targets.mapped[j] for j in hips]].mean(axis=1) * scale
-        pelvis = centres[number("sacroiliac")]
-        own = centres[[number(j) for j in hips]].mean(axis=0)
-        lower = targets.rotations["sacroiliac"] @ (own - pelvis)
-        position: Float64 = middle - lower - targets.rotations["HumanoidRoot"] @ (pelvis - centres[0])
-        return position
-    start: Float64 = targets.source_positions[:, targets.mapped["HumanoidRoot"]] * scale
-    return start
+    hips = [joint for joint in ("l_hip", "r_hip") if joint in targets.mapped]
+    if len(hips) < 2 or "sacroiliac" not in targets.skeleton:
+        return targets.source_positions[:, targets.mapped[ROOT]] * scale
+    middle = targets.source_positions[:, [targets.mapped[joint] for joint in hips]].mean(axis=1) * scale
+    pelvis = centres[number("sacroiliac")]
+    lower = centres[[number(joint) for joint in hips]].mean(axis=0) - pelvis
+    pelvis_shift = targets.rotations["sacroiliac"] @ lower
+    result: Float64 = middle - pelvis_shift - targets.rotations[ROOT] @ (pelvis - centres[0])
+    return result

@@ -8,12 +8,14 @@ small correction, so that the line from the first to the last points exactly in 
 bone.
 
 With fewer groups of the standard (from Spine1, the simple spine of four joints, to Spine5, all of them), each
-vertebra that may turn carries the line to the next such one, along the source's spine. Then all turn a little
+vertebra that may turn carries the line to the next that may, along the source's spine. Then all turn a little
 more, so that the errors of the bones' directions become as small as possible.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -23,18 +25,18 @@ from fba.arrays import Float64
 from fba.body import Skeleton
 from fba.parameters import baps
 
-TOP = "vt1"
+SHOULDERS = "vt1"
 """Vertebra that carries the clavicles."""
-HEAD = ("vc", "skullbase")
-"""What joints of neck and head begin with."""
+ABOVE_SHOULDERS = ("vc", "skullbase")
+"""Beginnings of the names of joints of neck and head."""
 GROUPS = 5
-"""Groups Spine1 to Spine5."""
-CHUNK = 2048
-"""Frames solved at once."""
-STEPS = 5
-"""Iterations of the least squares."""
-KEEP = 0.05
-"""Weight of small turns, relative to the directions of bones."""
+"""Number of groups, Spine1 to Spine5."""
+CHUNK_FRAMES = 2048
+"""Number of frames that are solved at once, which bounds the memory."""
+ITERATIONS = 5
+"""Number of iterations of the least squares."""
+TURN_WEIGHT = 0.05
+"""Weight of keeping turns small, relative to that of the directions of bones."""
 
 
 def joints(skeleton: Skeleton) -> list[str]:
@@ -55,10 +57,71 @@ def turning(skeleton: Skeleton, groups: int) -> list[str]:
     return [joint for joint in joints(skeleton) if joint in allowed]
 
 
+def heights(skeleton: Skeleton, chain: list[str]) -> Float64:
+    """Return the heights (N,) of joints above the first, along the spine."""
+    centres = skeleton.centres[[skeleton.number(joint) for joint in chain]]
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
+
+
+@dataclass(frozen=True, eq=False)
+class _SourceSpine:
+    """The source's spine, by heights on that of the body.
+
+    anchors: heights of its joints. positions: of each, (T, 3). levels: heights at which rotations are known,
+    the middles of bones and both ends. turned: the rotation (T, 3, 3) at each. shoulders: the height at which
+    the clavicles begin.
+    """
+
+    anchors: list[float]
+    positions: list[Float64]
+    levels: list[float]
+    turned: list[Float64]
+    shoulders: float
+
+    def rotation_between(self, low: float, high: float) -> Float64:
+        """Return the rotation of a vertebra at `low` and of those above it that do not turn, up to `high`."""
+        middle = (low + high) / 2
+        level = min(middle, self.shoulders) if low <= self.shoulders < high else middle
+        upper, share = _place(self.levels, level)
+        return rotations.part(self.turned[upper - 1], self.turned[upper], share)
+
+    def position_at(self, level: float) -> Float64:
+        """Return the source's position (T, 3) at a height."""
+        upper, share = _place(self.anchors, level)
+        result: Float64 = self.positions[upper - 1] * (1 - share) + self.positions[upper] * share
+        return result
+
+
+def _place(levels: list[float], level: float) -> tuple[int, float]:
+    """Return the number of the level above a height, and the share of the way to it from the level below."""
+    upper = int(np.clip(np.searchsorted(levels, level), 1, len(levels) - 1))
+    low, high = levels[upper - 1], levels[upper]
+    return upper, float(np.clip((level - low) / max(high - low, 1e-12), 0.0, 1.0))
+
+
+def _source_spine(
+    height: Mapping[str, float],
+    wanted: Mapping[str, Float64],
+    positions: Mapping[str, Float64],
+    anchors: list[str],
+) -> _SourceSpine:
+    """Return the source's spine. height: of the body's joints; the others as for `spread`."""
+    levels = [height[joint] for joint in anchors]
+    middles = [levels[0], *((low + high) / 2 for low, high in pairwise(levels)), levels[-1]]
+    turned = [wanted[anchors[0]], *(wanted[joint] for joint in anchors)]
+    below_neck = (n for n in reversed(range(len(anchors))) if not anchors[n].startswith(ABOVE_SHOULDERS))
+    chest = next(below_neck, 0)
+    shoulders = height.get(SHOULDERS, 0.0)
+    if middles[chest + 1] < shoulders < middles[min(chest + 2, len(middles) - 1)]:
+        middles.insert(chest + 2, shoulders)
+        turned.insert(chest + 2, turned[chest + 1])
+    return _SourceSpine(levels, [positions[joint] for joint in anchors], middles, turned, shoulders)
+
+
 def spread(
     skeleton: Skeleton,
     wanted: dict[str, Float64],
-    positions: dict[str, Float64],
+    positions: Mapping[str, Float64],
     anchors: list[str],
     groups: int,
     with_anchors: bool,
@@ -71,95 +134,84 @@ def spread(
     """
     chain = joints(skeleton)
     first, last = chain.index(anchors[0]), chain.index(anchors[-1])
-    centres = np.array([skeleton.centres[skeleton.number(joint)] for joint in chain])
-    height = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
-    anchor_heights = [height[chain.index(joint)] for joint in anchors]
-    keys = [
-        anchor_heights[0],
-        *((a + b) / 2 for a, b in pairwise(anchor_heights)),
-        anchor_heights[-1],
-    ]
-    turned = [wanted[anchors[0]], *(wanted[joint] for joint in anchors)]
-    chest = next((n for n, joint in reversed(list(enumerate(anchors))) if not joint.startswith(HEAD)), 0)
-    top = chain.index(TOP) if TOP in chain else 0
-    if keys[chest + 1] < height[top] < keys[min(chest + 2, len(keys) - 1)]:
-        keys.insert(chest + 2, float(height[top]))
-        turned.insert(chest + 2, turned[chest + 1])
-
-    def rotation_between(joint: int, end: int) -> Float64:
-        """Return the rotation of a vertebra, and of those above it that do not turn, up to another one."""
-        middle = (height[joint] + height[end]) / 2
-        return rotation_at(min(middle, height[top]) if joint <= top < end else middle)
-
-    def rotation_at(level: float) -> Float64:
-        upper = int(np.clip(np.searchsorted(keys, level), 1, len(keys) - 1))
-        low, high = keys[upper - 1], keys[upper]
-        share = float(np.clip((level - low) / max(high - low, 1e-12), 0.0, 1.0))
-        return rotations.part(turned[upper - 1], turned[upper], share)
-
-    def position_at(level: float) -> Float64:
-        upper = int(np.clip(np.searchsorted(anchor_heights, level), 1, len(anchor_heights) - 1))
-        low, high = anchor_heights[upper - 1], anchor_heights[upper]
-        share = float(np.clip((level - low) / max(high - low, 1e-12), 0.0, 1.0))
-        result: Float64 = positions[anchors[upper - 1]] * (1 - share) + positions[anchors[upper]] * share
-        return result
-
     turning_joints = {*turning(skeleton, groups), *(anchors if with_anchors else ())}
     free = [joint for joint in chain[first + 1 : last + 1] if joint in turning_joints]
     if not free:
         return
-    pinned = anchors if groups >= GROUPS or with_anchors else [anchors[0], *free]
+    height = dict(zip(chain, heights(skeleton, chain).tolist(), strict=True))
+    source = _source_spine(height, wanted, positions, anchors)
+    pinned = list(anchors if groups >= GROUPS or with_anchors else [anchors[0], *free])
     if pinned[-1] != anchors[-1]:
-        pinned = [*pinned, anchors[-1]]
+        pinned.append(anchors[-1])
     head = wanted[anchors[-1]]
     for joint in anchors[1:]:
         wanted.pop(joint, None)
-    for low_joint, high_joint in pairwise(pinned):
-        low, high = chain.index(low_joint), chain.index(high_joint)
-        inside = [n for n in range(low, high) if n == low or chain[n] in free]
-        ends = [*inside[1:], high]
-        bent = {n: rotation_between(n, end) for n, end in zip(inside, ends, strict=True)}
-        line = sum(
-            (bent[n] @ (centres[end] - centres[n]) for n, end in zip(inside, ends, strict=True)),
-            np.zeros(3),
-        )
-        way = position_at(height[high]) - position_at(height[low])
-        length = np.linalg.norm(way, axis=1).min()
-        turn = rotations.between_all(line, way) if length > 1e-9 else np.eye(3)
-        for n in inside:
-            wanted[chain[n]] = turn @ bent[n]
+    for low, high in pairwise(pinned):
+        between = chain[chain.index(low) + 1 : chain.index(high)]
+        path = [low, *(joint for joint in between if joint in free), high]
+        wanted |= _bend(path, skeleton, height, source)
     wanted[anchors[-1]] = head
     if pinned != anchors:
-        lines = [positions[above] - positions[below] for below, above in pairwise(anchors)]
-        at_ends = [chain.index(joint) for joint in anchors]
-        own = sorted({first, *(chain.index(joint) for joint in free if joint != anchors[-1])})
-        before = np.stack([wanted[chain[n]] for n in own])
-        course = np.stack(lines)
-        for begin in range(0, before.shape[1], CHUNK):  # matrices of a whole capture would not fit
-            chunk = slice(begin, begin + CHUNK)
-            before[:, chunk] = _refine(list(before[:, chunk]), own, centres, at_ends, list(course[:, chunk]))
-        wanted.update({chain[n]: part for n, part in zip(own, before, strict=True)})
+        _correct_directions(skeleton, wanted, positions, anchors, free)
+
+
+def _bend(
+    path: list[str], skeleton: Skeleton, height: Mapping[str, float], source: _SourceSpine
+) -> dict[str, Float64]:
+    """Return the rotations of all joints of a path but the last, whose line then points as the source's."""
+    centres = [skeleton.centres[skeleton.number(joint)] for joint in path]
+    bent = [source.rotation_between(height[low], height[high]) for low, high in pairwise(path)]
+    line = sum(
+        (turn @ (end - start) for turn, (start, end) in zip(bent, pairwise(centres), strict=True)),
+        np.zeros(3),
+    )
+    aim = source.position_at(height[path[-1]]) - source.position_at(height[path[0]])
+    shortest = np.linalg.norm(aim, axis=1).min()
+    correction = rotations.between_all(line, aim) if shortest > 1e-9 else np.eye(3)
+    return {joint: correction @ turn for joint, turn in zip(path[:-1], bent, strict=True)}
+
+
+def _correct_directions(
+    skeleton: Skeleton,
+    wanted: dict[str, Float64],
+    positions: Mapping[str, Float64],
+    anchors: list[str],
+    free: list[str],
+) -> None:
+    """Turn free joints a little more, so that the lines between anchors point as the source's do."""
+    chain = joints(skeleton)
+    centres = skeleton.centres[[skeleton.number(joint) for joint in chain]]
+    ends = [chain.index(joint) for joint in anchors]
+    turning_numbers = sorted({ends[0], *(chain.index(joint) for joint in free if joint != anchors[-1])})
+    parts = np.stack([wanted[chain[number]] for number in turning_numbers])
+    lines = np.stack([positions[above] - positions[below] for below, above in pairwise(anchors)])
+    for begin in range(0, parts.shape[1], CHUNK_FRAMES):
+        chunk = slice(begin, begin + CHUNK_FRAMES)
+        parts[:, chunk] = _refine(
+            list(parts[:, chunk]), turning_numbers, centres, ends, list(lines[:, chunk])
+        )
+    wanted.update({chain[number]: part for number, part in zip(turning_numbers, parts, strict=True)})
 
 
 def _refine(
-    parts: list[Float64], own: list[int], centres: Float64, ends: list[int], lines: list[Float64]
+    parts: list[Float64], turning: list[int], centres: Float64, ends: list[int], lines: list[Float64]
 ) -> list[Float64]:
     """Return parts of the spine, turned so that the errors of all source bones become as small as possible.
 
-    parts: rotations (T, 3, 3) of the vertebrae own, and of those above them up to the next one. centres: (N,
-    3), of the chain. ends: numbers of the anchors in it. lines: (T, 3), from each anchor to the next in the
-    source.
+    parts: rotations (T, 3, 3) of the vertebrae that turn, each with those above it that do not. turning:
+    numbers of these vertebrae in the chain. centres: (N, 3), of the chain. ends: numbers of the anchors in
+    it. lines: (T, 3), from each anchor to the next in the source.
     """
     count, frames = len(parts), len(parts[0])
-    below = np.searchsorted(own, np.arange(len(centres) - 1), side="right") - 1
+    below = np.searchsorted(turning, np.arange(len(centres) - 1), side="right") - 1
     steps = np.diff(centres, axis=0)
     pieces = np.zeros((len(lines), count, 3))
     for bone, (low, high) in enumerate(pairwise(ends)):
         for segment in range(low, high):
             pieces[bone, below[segment]] += steps[segment]
     wanted = [line / np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-12) for line in lines]
-    for _ in range(STEPS):
-        normal = np.zeros((frames, 3 * count, 3 * count)) + KEEP * KEEP * np.eye(3 * count)
+    for _ in range(ITERATIONS):
+        normal = np.zeros((frames, 3 * count, 3 * count)) + TURN_WEIGHT * TURN_WEIGHT * np.eye(3 * count)
         pull = np.zeros((frames, 3 * count))
         for bone, direction in enumerate(wanted):
             if np.linalg.norm(lines[bone], axis=1).min() < 1e-9:

@@ -40,15 +40,16 @@ FREE_ANGLES = {
     "toes": 35.0,
     "clavicles": 75.0,
 }
-"""Angles in degrees that count as standing upright."""
+"""Largest angles in degrees of somebody who stands upright, of the same parts."""
+LIMB_BONES = (
+    ("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"), ("ankle", "metatarsal"),
+)  # fmt: skip
+"""Joints at both ends of the bones of limbs."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stance:
-    """How poses stand.
-
-    up, left: unit (T, 3), of the trunk. angles: part -> (T,), in degrees,
-    see `MAX_ANGLES`."""
+    """How poses stand. up, left: unit (T, 3), of the trunk. angles: part -> (T,), see `MAX_ANGLES`."""
 
     up: Float64
     left: Float64
@@ -64,28 +65,69 @@ class Stance:
 
     @property
     def distance(self) -> Float64:
-        """Degrees (T,) by which poses differ from standing straight, as the root of a mean of squares."""
+        """Root mean square angle (T,), in degrees, by which parts differ from standing upright."""
         parts = [np.maximum(angle - FREE_ANGLES[what], 0.0) for what, angle in self.angles.items()]
-        result: Float64 = np.sqrt(np.mean(np.square(parts), axis=0)) if parts else np.zeros(len(self.up))
-        return result
+        return np.sqrt(np.mean(np.square(parts), axis=0)) if parts else np.zeros(len(self.up))
 
     def worst(self, row: int) -> str:
-        """Return what is farthest from standing in a pose: "thigh 87 degrees"."""
+        """Return the part that is farthest from standing in a pose: "thigh 87 degrees"."""
         if not self.angles:
             return "nothing"
-        what = max(self.angles, key=lambda key: float(self.angles[key][row]) / MAX_ANGLES[key])
-        return f"{what} {self.angles[what][row]:.0f} degrees"
+        part = max(self.angles, key=lambda each: float(self.angles[each][row]) / MAX_ANGLES[each])
+        return f"{part} {self.angles[part][row]:.0f} degrees"
 
 
 def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
     """Return how poses stand. positions: (T, J, 3), in any axes. mapped: body's joint -> source's joint."""
+    axes = _trunk_axes(positions, mapped)
+
+    def bone(start: str, end: str) -> Float64 | None:
+        """Return unit directions (T, 3) between joints: their parts along left, up and ahead."""
+        if start not in mapped or end not in mapped:
+            return None
+        line = positions[:, mapped[end]] - positions[:, mapped[start]]
+        return unit((axes @ line[:, :, None])[:, :, 0])
+
+    angles: dict[str, Float64] = {}
+
+    def add(part: str, angle: Float64) -> None:
+        """Keep the larger angle of a part."""
+        angles[part] = np.maximum(angles.get(part, np.zeros(len(positions))), angle)
+
+    left, up, ahead = np.eye(3)
+    limbs = {}
+    for side, outwards in (("l", left), ("r", -left)):
+        for start, end in LIMB_BONES:
+            limbs[side, start] = bone(f"{side}_{start}", f"{side}_{end}")
+        if (thigh := limbs[side, "hip"]) is not None:
+            add("thigh", degrees_between(thigh, -up))
+            if (shank := limbs[side, "knee"]) is not None:
+                add("knee", degrees_between(thigh, shank))
+        if (arm := limbs[side, "shoulder"]) is not None and (fore := limbs[side, "elbow"]) is not None:
+            add("elbow", degrees_between(arm, fore))
+        if (foot := limbs[side, "ankle"]) is not None:
+            add("toes", degrees_between(foot * (1 - up) + 1e-9 * ahead, ahead))
+        if (clavicle := bone(f"{side}_sternoclavicular", f"{side}_shoulder")) is not None:
+            add("clavicles", degrees_between(clavicle, outwards))
+    for part, start in (("legs", "hip"), ("legs", "knee"), ("arms", "shoulder"), ("arms", "elbow")):
+        left_bone, right_bone = limbs["l", start], limbs["r", start]
+        if left_bone is not None and right_bone is not None:
+            add(part, degrees_between(left_bone, right_bone * [-1.0, 1.0, 1.0]))
+    if (shoulders := bone("r_shoulder", "l_shoulder")) is not None:
+        add("shoulders", degrees_between(shoulders, left))
+    if (neck := bone("vc7", "skullbase")) is not None:
+        add("back", degrees_between(neck, up) * 0.8)
+    return Stance(axes[:, 1], axes[:, 0], angles)
+
+
+def _trunk_axes(positions: Float64, mapped: Mapping[str, int]) -> Float64:
+    """Return rows (T, 3, 3): left, up and ahead, as the hips and the trunk above them show."""
 
     def middle(*joints: str) -> Float64 | None:
         numbers = [mapped[joint] for joint in joints if joint in mapped]
         result: Float64 | None = positions[:, numbers].mean(axis=1) if len(numbers) == len(joints) else None
         return result
 
-    count = len(positions)
     pairs = [
         positions[:, mapped[f"l_{joint}"]] - positions[:, mapped[f"r_{joint}"]]
         for joint in ("hip", "shoulder", "knee")
@@ -93,7 +135,7 @@ def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
     ]
     left = next((pair for pair in pairs if np.linalg.norm(pair, axis=1).min() > 0), None)
     if left is None:
-        left = pairs[0] if pairs else np.tile([1.0, 0.0, 0.0], (count, 1))
+        left = pairs[0] if pairs else np.tile([1.0, 0.0, 0.0], (len(positions), 1))
     left = unit(left)
     below = middle("l_hip", "r_hip")
     below = positions[:, mapped[ROOT]] if below is None else below
@@ -105,57 +147,7 @@ def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
         above = 2 * below - feet if feet is not None else below + np.array([0.0, 1.0, 0.0])
     up = above - below
     up = unit(up - left * np.sum(up * left, axis=1, keepdims=True))
-    ahead = np.cross(left, up)
-    axes = np.stack([left, up, ahead], axis=1)  # (T, 3, 3): rows; axes @ v gives parts along left, up, ahead
-
-    def bone(a: str, b: str) -> Float64 | None:
-        if a not in mapped or b not in mapped:
-            return None
-        line = positions[:, mapped[b]] - positions[:, mapped[a]]
-        return unit((axes @ line[:, :, None])[:, :, 0])
-
-    angles: dict[str, Float64] = {}
-
-    def add(what: str, angle: Float64) -> None:
-        angles[what] = np.maximum(angles.get(what, np.zeros(count)), angle)
-
-    limbs = {}
-    for side in "lr":
-        for a, b in (
-            ("hip", "knee"),
-            ("knee", "ankle"),
-            ("shoulder", "elbow"),
-            ("elbow", "wrist"),
-            ("ankle", "metatarsal"),
-        ):
-            limbs[side, a] = bone(f"{side}_{a}", f"{side}_{b}")
-        if (thigh := limbs[side, "hip"]) is not None:
-            add("thigh", degrees_between(thigh, np.array([0.0, -1.0, 0.0])))
-            if (shank := limbs[side, "knee"]) is not None:
-                add("knee", degrees_between(thigh, shank))
-        if (arm := limbs[side, "shoulder"]) is not None and (fore := limbs[side, "elbow"]) is not None:
-            add("elbow", degrees_between(arm, fore))
-        if (foot := limbs[side, "ankle"]) is not None:
-            add(
-                "toes",
-                degrees_between(
-                    foot * np.array([1.0, 0.0, 1.0]) + np.array([0.0, 0.0, 1e-9]), np.array([0.0, 0.0, 1.0])
-                ),
-            )
-        if (clavicle := bone(f"{side}_sternoclavicular", f"{side}_shoulder")) is not None:
-            add("clavicles", degrees_between(clavicle, np.array([1.0 if side == "l" else -1.0, 0.0, 0.0])))
-    for what, a in (("legs", "hip"), ("legs", "knee"), ("arms", "shoulder"), ("arms", "elbow")):
-        one, other = limbs["l", a], limbs["r", a]
-        if one is not None and other is not None:
-            add(what, degrees_between(one, other * [-1.0, 1.0, 1.0]))
-    shoulders = middle("l_shoulder"), middle("r_shoulder")
-    if shoulders[0] is not None and shoulders[1] is not None:
-        line = (axes @ unit(shoulders[0] - shoulders[1])[:, :, None])[:, :, 0]
-        add("shoulders", degrees_between(line, np.array([1.0, 0.0, 0.0])))
-    neck = bone("vc7", "skullbase")
-    if neck is not None:
-        add("back", degrees_between(neck, np.array([0.0, 1.0, 0.0])) * 0.8)
-    return Stance(up, left, angles)
+    return np.stack([left, up, np.cross(left, up)], axis=1)
 
 
 def row_turn(frames: Float64, row: Float64, at_rest: Float64) -> float:

@@ -10,25 +10,23 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture import _standing as standing
-from fba.capture.motion import SkeletonMotion, read_axis
+from fba.capture.motion import SAMPLE_FRAMES, SkeletonMotion, read_axis
 
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
 MIN_UP_LENGTH = 0.75
 """Smallest length of the mean of upright directions, 0 to 1, with which the motion shows which axis is up."""
-SAMPLE_FRAMES = 400
-"""Number of frames in which it is looked for where the body rests."""
 MAX_FLOOR_DISTANCE = 0.06
 """Share of a body's height within which joints above the lowest touch the floor."""
 MAX_REST_SPEED = 0.2
 """Largest speed of a joint at rest, in heights of the body per second."""
 REST_INTERVAL = 0.1
-"""Seconds between the two moments that are compared to see whether a joint rests."""
+"""Seconds between the two moments whose comparison shows whether a joint rests."""
 MAX_OFF_CENTRE = 0.15
 """Largest horizontal distance of a body's middle from the joints that carry it, in heights of the body."""
 MIN_CARRIED_SHARE = 0.4
 """Smallest share of frames in which joints rest on a floor, if there is one."""
-MIDDLE = ("l_hip", "r_hip", "l_shoulder", "r_shoulder")
-LEG = 0.5
+TRUNK = ("l_hip", "r_hip", "l_shoulder", "r_shoulder")
+LEG_SHARE = 0.5
 """Share of a body's height that a leg takes."""
 
 
@@ -36,8 +34,8 @@ LEG = 0.5
 class Up:
     """The axis of a source that points up.
 
-    axis: such as "+z". confidence: 0 to 1. reason: for people. doubt: what is to be said, where the axis is
-    not the rest pose's, or people seem to lie or hang; else empty. instead: the axis that it may be, too.
+    axis: such as "+z". confidence: 0 to 1. reason: for people. doubt: what speaks against the axis, where it
+    is not that of the rest pose, or people seem to lie or hang; else empty. instead: the other likely axis.
     """
 
     axis: str
@@ -49,7 +47,7 @@ class Up:
 
 @dataclass(frozen=True)
 class _Floor:
-    """What joints rest on along an axis: whether they do at all, and whether that carries the body alone."""
+    """The floor at the low end of an axis: whether joints rest on it, and whether these carry the body."""
 
     touched: bool
     carries: bool
@@ -73,10 +71,10 @@ def find_up_axis(
 ) -> Up:
     """Return the axis that points up.
 
-    positions: (T, J, 3), of the source, of some frames. up: as given.
+    positions: (T, J, 3), of the source in some frames. up: as the caller gave it.
 
     What the format says counts, else the axis of the rest pose, unless joints rest on a floor along another
-    axis and not along it: from feet to head is not up of somebody who lies, crawls, hangs or flies.
+    axis and not along this axis: feet and head of somebody who lies, crawls, hangs or flies do not show it.
     """
     if up != "auto":
         return Up(up, 1.0, f"{up} as given")
@@ -92,29 +90,32 @@ def find_up_axis(
     trunk = _name(axis)
     if not bool(at_rest.possible[0]):
         return _find_freely(motion, mapped, trunk, clear, stands)
-    own = _name(nearest_axis(at_rest.up[0]))
-    if own == trunk and clear >= MIN_UP_LENGTH:
-        return Up(own, max(clear, 0.8), (
-            f"{own}: people stand along it, as in the rest pose ({100 * clear:.0f} %)"
-        ))  # fmt: skip
+    rest_axis = _name(nearest_axis(at_rest.up[0]))
+    if rest_axis == trunk and clear >= MIN_UP_LENGTH:
+        reason = f"{rest_axis}: people stand along it, as in the rest pose ({100 * clear:.0f} %)"
+        return Up(rest_axis, max(clear, 0.8), reason)
     moments = _find_moments(motion)
     floors = {name: _find_floor(moments, mapped, name) for name in UPS}
     stood = upright and floors[trunk].carries
-    if floors[own].carries or (floors[own].touched and not stood):
+    if floors[rest_axis].carries or (floors[rest_axis].touched and not stood):
         doubt = ""
-        if trunk != own and clear >= MIN_UP_LENGTH and floors[trunk].touched:
+        if trunk != rest_axis and clear >= MIN_UP_LENGTH and floors[trunk].touched:
             doubt = f"joints rest on a floor along it, as in the rest pose, but trunks point along {trunk}"
-        return Up(own, 0.8, f"{own}, as in the rest pose: joints rest on a floor along it", doubt, trunk)
+        return Up(
+            rest_axis, 0.8, f"{rest_axis}, as in the rest pose: joints rest on a floor along it", doubt, trunk
+        )
     others = [trunk] if upright else []
-    found = next((name for name in (*others, "+y", "+z") if floors[name].carries), None)
-    if found is None:
+    floor_axis = next((name for name in (*others, "+y", "+z") if floors[name].carries), None)
+    if floor_axis is None:
         doubt = f"bodies are stretched along {trunk}, and joints rest on no floor along any axis"
-        reason = f"{own}, as in the rest pose; joints rest on no floor along any axis"
-        return Up(own, 0.6, reason, doubt if trunk != own else "", trunk)
-    does = "people stand" if found == trunk else "joints rest on a floor"
-    reason = f"{found}: {does} along it, and nothing rests along {own}, the rest pose's"
-    doubt = f"{does} along it, while the rest pose stands along {own}, where no joint rests in the motion"
-    return Up(found, 0.7, reason, doubt, own)
+        reason = f"{rest_axis}, as in the rest pose; joints rest on no floor along any axis"
+        return Up(rest_axis, 0.6, reason, doubt if trunk != rest_axis else "", trunk)
+    does = "people stand" if floor_axis == trunk else "joints rest on a floor"
+    reason = f"{floor_axis}: {does} along it, and nothing rests along {rest_axis}, the rest pose's"
+    doubt = (
+        f"{does} along it, while the rest pose stands along {rest_axis}, where no joint rests in the motion"
+    )
+    return Up(floor_axis, 0.7, reason, doubt, rest_axis)
 
 
 def _find_freely(
@@ -122,17 +123,17 @@ def _find_freely(
 ) -> Up:
     """Return the axis that points up in a file whose rest pose nobody can take.
 
-    trunk: the axis along which trunks point, clear: how much they do. stands: whether anybody does.
+    trunk: the axis along which trunks point. clear: how clearly, 0 to 1. stands: whether anybody stands.
     """
     if not stands and trunk[1] == "x":
         return Up(trunk, 0.4, f"perhaps {trunk}: trunks point along it, but nobody ever stands")
     first = [trunk] if clear >= MIN_UP_LENGTH and trunk in ("+y", "+z") else []
     moments = _find_moments(motion)
     floors = {name: _find_floor(moments, mapped, name) for name in {"+y", "+z", trunk}}
-    found = next((name for name in (*first, "+y", "+z") if floors[name].touched), trunk)
-    if found != trunk:
+    floor_axis = next((name for name in (*first, "+y", "+z") if floors[name].touched), trunk)
+    if floor_axis != trunk:
         doubt = f"joints rest on a floor along it, but trunks point along {trunk}, and nobody can rest so"
-        return Up(found, 0.6, f"{found}: joints rest on a floor along it", doubt, trunk)
+        return Up(floor_axis, 0.6, f"{floor_axis}: joints rest on a floor along it", doubt, trunk)
     if clear < MIN_UP_LENGTH:
         return Up(trunk, clear * 0.6, f"perhaps {trunk}: the body is upright for little of the time")
     doubt = ""
@@ -165,7 +166,7 @@ def _find_floor(moments: _Moments, mapped: Mapping[str, int], up: str) -> _Floor
     moved = np.linalg.norm(moments.later[:, joints] - places[:, joints], axis=2)
     rests = (heights < level + MAX_FLOOR_DISTANCE * size) & (moved < MAX_REST_SPEED * size * moments.seconds)
     touched = rests.any(axis=1)
-    middle = [joints.index(mapped[name]) for name in MIDDLE if name in mapped] or list(range(len(joints)))
+    middle = [joints.index(mapped[name]) for name in TRUNK if name in mapped] or list(range(len(joints)))
     flat = places[:, joints] * (1 - np.abs(axis))
     centre = flat[:, middle].mean(axis=1)
     ends = [np.where(rests[..., None], flat, -sign * np.inf) for sign in (1, -1)]
@@ -182,12 +183,12 @@ def _height(places: Float64, mapped: Mapping[str, int]) -> float:
         chain = [mapped.get(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")]
         if None not in chain:
             bones = np.diff(places[0, [joint for joint in chain if joint is not None]], axis=0)
-            return float(np.linalg.norm(bones, axis=1).sum()) / LEG
+            return float(np.linalg.norm(bones, axis=1).sum()) / LEG_SHARE
     return float(np.ptp(places, axis=1).max())
 
 
 def find_upright(motion: SkeletonMotion, mapped: Mapping[str, int]) -> Float64:
-    """Return the rotation (3, 3) of the axes of a rest pose that brings the one closest to its up to +y."""
+    """Return the rotation (3, 3) to +y of the axis that is closest to the upward direction at rest."""
     stance = standing.measure(motion.rest()[None], mapped)
     return rotations.between(nearest_axis(stance.up[0]), np.array([0.0, 1.0, 0.0]))
 
@@ -211,6 +212,7 @@ def turn_axes(motion: SkeletonMotion, turn: Float64) -> SkeletonMotion:
 
 
 def nearest_axis(direction: Float64) -> Float64:
+    """Return the axis (3,), along x, y or z, that is closest to a direction."""
     axis = np.zeros(3)
     best = int(np.argmax(np.abs(direction)))
     axis[best] = np.sign(direction[best]) or 1.0

@@ -1,8 +1,8 @@
 """Which joint of a source is which joint of the body: by a family of names, or else word by word.
 
-And whether the joints that a source calls left are on the person's left side: toes and knees point ahead, and
-left is where up and ahead say. In a file that was mirrored, as by a program with left-handed axes, or whose
-names are swapped, they point backwards.
+And whether the joints that a source calls left are on the person's left side: up and ahead give the left, and
+toes and knees point ahead. They point backwards in a file whose names are swapped or that was mirrored, as by
+a program with left-handed axes.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ CORE = tuple(
 )
 """Joints that a whole body has."""
 ENDS = {"l_metatarsal": "l_ankle", "r_metatarsal": "r_ankle", "skullbase": ROOT}
-"""Joints that makers of one family name otherwise, and the joint that they hang on, or far above."""
+"""Joints whose names differ within a family, and the joint that they hang on, directly or far below."""
 LIMBS = tuple(
     tuple(f"{side}_{joint}" for joint in chain)
     for side in "lr"
     for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 )
 """Joints of each limb: a source that has one of them should have all."""
-BACKWARDS = -0.5
-"""Mean cosine to ahead of knees, or of toes where knees hardly bend, above which they point backwards. In
-real files knees have 0.8 to 1, toes 0.15 to 1."""
+MAX_BACKWARD_COSINE = -0.5
+"""Largest mean cosine of the angle between ahead and knees that point backwards, or toes where knees hardly
+bend. In real files it is 0.8 to 1 for knees, 0.15 to 1 for toes."""
 MIN_KNEE_BEND = 0.12
 """Smallest distance of a bent knee from the line from hip to ankle, in leg lengths."""
 MIN_BENT_FRAMES = 5
@@ -43,7 +43,7 @@ MIN_BENT_FRAMES = 5
 
 @dataclass(frozen=True)
 class Bones:
-    """Which joints of a source are joints of the body.
+    """The joints of a source that are joints of the body.
 
     family: of the names. joints: joint of the body -> number of the source's. confidence: 0 to 1. reason: for
     people.
@@ -62,25 +62,24 @@ def find_bones(motion: SkeletonMotion, joints: Mapping[str, str] | None, skeleto
     more limbs, its joints are added to a family that names at least as many joints, and else replace it.
     ModelError where no bones are found.
     """
-    if joints is None and motion.declared:
-        family, mapped = matching.map_joints(motion.names, motion.declared, skeleton)
-        return Bones(family, mapped, 1.0, f"{len(mapped)} joints as the file says")
-    if joints is not None:
-        family, mapped = matching.map_joints(motion.names, joints, skeleton)
-        return Bones(family, mapped, 1.0, f"{len(mapped)} joints as given")
+    given = motion.declared or None if joints is None else joints
+    if given is not None:
+        family, mapped = matching.map_joints(motion.names, given, skeleton)
+        source = "given" if joints is not None else "the file says"
+        return Bones(family, mapped, 1.0, f"{len(mapped)} joints as {source}")
     try:
         family, by_family = matching.map_joints(motion.names, None, skeleton)
         failure = None
     except ModelError as error:
         family, by_family, failure = "", {}, error
-    own = _core(by_family, motion)
-    ends = any(joint in skeleton and joint not in by_family for joint in ENDS)
-    if failure is not None or own < len(CORE) or (ends and len(by_family) < len(motion.names)):
-        by_words = named_bones.find(motion.names, motion.parents, motion.offsets, skeleton)
-        if _core(by_words, motion) > own:
+    core = _count_core(by_family, motion)
+    lacks_ends = any(joint in skeleton and joint not in by_family for joint in ENDS)
+    if failure is not None or core < len(CORE) or (lacks_ends and len(by_family) < len(motion.names)):
+        by_words = named_bones.find(motion, skeleton)
+        if _count_core(by_words, motion) > core:
             both = _fill_limbs(by_family, by_words)
-            if len(by_family) >= len(by_words) and _core(both, motion) == _core(by_words, motion):
-                by_family = both  # of a family, but for some joints that somebody renamed
+            if len(by_family) >= len(by_words) and _count_core(both, motion) == _count_core(by_words, motion):
+                by_family = both  # a family, in which somebody renamed a few joints
             else:
                 family, by_family, failure = "words", by_words, None
         if family != "words":
@@ -91,21 +90,19 @@ def find_bones(motion: SkeletonMotion, joints: Mapping[str, str] | None, skeleto
         raise _unknown_bones(motion, by_family)
     missing = [joint for joint in CORE if joint not in by_family]
     sure = (1.0 if family != "words" else 0.9) - 0.03 * len(missing)
-    how = f"{len(by_family)} of {len(motion.names)} joints by " + (
-        "the words in their names" if family == "words" else f"names as of {family!r}"
-    )
-    return Bones(family, by_family, sure, how)
+    names = "the words in their names" if family == "words" else f"names as of {family!r}"
+    return Bones(family, by_family, sure, f"{len(by_family)} of {len(motion.names)} joints by {names}")
 
 
 def _fill_limbs(mapped: Mapping[str, int], others: Mapping[str, int]) -> dict[str, int]:
-    """Return joints with those joints of limbs that are missing, from others."""
+    """Return joints, and those of limbs that are missing among them from others."""
     used = set(mapped.values())
     missing = {joint: number for joint, number in others.items() if joint in CORE and number not in used}
     return {**missing, **mapped}
 
 
 def _fill_ends(mapped: Mapping[str, int], others: Mapping[str, int]) -> dict[str, int]:
-    """Return joints with those of toes and head that are missing, from others that agree on what is below."""
+    """Return joints, and missing ones of toes and head from others that agree on the joint above."""
     used = set(mapped.values())
     return dict(mapped) | {
         joint: others[joint]
@@ -117,15 +114,15 @@ def _fill_ends(mapped: Mapping[str, int], others: Mapping[str, int]) -> dict[str
 
 
 def count_limbs(mapped: Mapping[str, int], motion: SkeletonMotion) -> int:
-    """Return the number of arms and legs whose upper bone is known, both its joints."""
+    """Return the number of arms and legs of whose upper bone both joints are mapped."""
     return sum(
         upper in mapped and lower in mapped and _is_below(motion, mapped[lower], mapped[upper])
         for upper, lower, _ in LIMBS
     )
 
 
-def _core(mapped: Mapping[str, int], motion: SkeletonMotion) -> int:
-    """Return how many of the core joints are known and hang where they should."""
+def _count_core(mapped: Mapping[str, int], motion: SkeletonMotion) -> int:
+    """Return the number of core joints that are mapped and hang where they should."""
     count = 0
     for limb in LIMBS:
         above = mapped.get(ROOT)
@@ -152,11 +149,11 @@ def _unknown_bones(motion: SkeletonMotion, mapped: Mapping[str, int]) -> ModelEr
     return ModelError(
         f"no human skeleton is found: no arms or legs are among these {len(motion.names)} joint names: "
         f"{_listed(motion)}{seen}; {_sought()}"
-    ).with_remedies(joints_remedy())
+    ).with_remedies(matching.GIVE_JOINTS)
 
 
 def check_extent(motion: SkeletonMotion) -> None:
-    """Raise ModelError for a motion whose joints are all at one place, as of a thing that moves as one."""
+    """Raise ModelError for a motion whose joints coincide, as of a thing that moves as a whole."""
     if np.ptp(motion.rest(), axis=0).any():
         return
     count = len(motion.names)
@@ -179,17 +176,10 @@ def _sought() -> str:
     )
 
 
-def joints_remedy() -> Remedy:
-    """Return what helps where joints are not found."""
-    return Remedy(
-        "joints", "name each joint's counterpart in the standard with {}", "{'Pelvis': 'HumanoidRoot', ...}"
-    )
-
-
 def refuse_swapped_sides(motion: SkeletonMotion, mapped: Mapping[str, int]) -> None:
-    """Raise ModelError if toes and knees of a motion point backwards, so that what is called left is right.
+    """Raise ModelError if toes and knees of a motion point backwards, so that joints called left are right.
 
-    Nothing is raised where neither is known, or toes do not agree with knees.
+    Motions in which neither is known pass, and so do those in which toes and knees disagree.
     """
     needed = [f"{side}_{joint}" for side in "lr" for joint in ("hip", "knee", "ankle")]
     if not all(joint in mapped for joint in needed):
@@ -207,11 +197,11 @@ def refuse_swapped_sides(motion: SkeletonMotion, mapped: Mapping[str, int]) -> N
         bent = np.linalg.norm(off, axis=1) > MIN_KNEE_BEND * reach
         knees += (unit(off[bent]) * ahead[bent]).sum(axis=1).tolist()
         if f"{side}_metatarsal" in mapped:
-            way = unit(positions[:, mapped[f"{side}_metatarsal"]] - ankle)
-            toes += (way * ahead).sum(axis=1).tolist()
+            toe_bone = unit(positions[:, mapped[f"{side}_metatarsal"]] - ankle)
+            toes += (toe_bone * ahead).sum(axis=1).tolist()
     toe = float(np.mean(toes)) if toes else None
-    main = float(np.mean(knees)) if len(knees) >= MIN_BENT_FRAMES else toe
-    if main is None or main > BACKWARDS or (toe is not None and toe > 0):
+    cosine = float(np.mean(knees)) if len(knees) >= MIN_BENT_FRAMES else toe
+    if cosine is None or cosine > MAX_BACKWARD_COSINE or (toe is not None and toe > 0):
         return
     raise ModelError(
         "left and right are swapped: toes and knees point backwards, seen from the joints that are called "

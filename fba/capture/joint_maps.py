@@ -1,4 +1,4 @@
-"""Maps from the joints of a capture to those of the standard: found, corrected by hand, in TOML files."""
+"""Maps from joints of a capture to those of the standard: to find, to change, and to keep in TOML files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TABLE = "joints"
 
 
 def find_map(motion: SkeletonMotion, joints: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the joints of a capture that move joints of the standard, and these, in the capture's order.
+    """Return joint of the capture -> joint of the standard that it moves, in the capture's order.
 
     joints: as for `from_skeleton`; None to find them. ModelError where none are found.
     """
@@ -29,11 +29,11 @@ def find_map(motion: SkeletonMotion, joints: Mapping[str, str] | None = None) ->
 def change_map(
     motion: SkeletonMotion, base: Mapping[str, str] | None, pairs: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return a map with some joints of a capture given by hand.
+    """Return a map in which some joints are changed by hand.
 
-    base: the map that is changed; None for what is found, or for an empty one where nothing is. pairs: joint
-    of the capture -> joint of the standard, or "" to leave the joint out. Another joint of the capture that
-    had the same joint of the standard loses it.
+    base: the map before; None for what `find_map` returns, or for an empty map where it finds nothing. pairs:
+    joint of the capture -> joint of the standard, or "" to leave the joint out. Another joint of the capture
+    that had the same joint of the standard loses it.
 
     OptionError for a joint that the capture or the standard lacks, and where no joint is the root.
     """

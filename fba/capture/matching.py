@@ -6,21 +6,19 @@ Besides the families of the file, the standard's own names are one, "h-anim".
 
 from __future__ import annotations
 
-import csv
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib.resources import files
 from itertools import islice
 
 from fba.body import Skeleton
 from fba.body.skeleton import ROOT
 from fba.errors import ModelError, Remedy
+from fba.name_maps import both_sides, simplify
 from fba.parameters import joints
+from fba.source import read_table
 
-REQUIRED = (ROOT,)
-"""Joints that every source must have."""
 MIN_NAMES = 5
 """Smallest number of names by which a family fits."""
 MAX_PREFIX_LENGTH = 100
@@ -28,30 +26,22 @@ MAX_PREFIX_LENGTH = 100
 MAX_PREFIX_MARKS = 8
 """Largest number of separators in a shared prefix."""
 PREFIX_NAMES = 8
-"""Number of first names that are tried as beginning of the others: "Bip01", "Bip01 Pelvis"."""
+"""Number of first names that are tried as the beginning of the others: "Bip01", "Bip01 Pelvis"."""
+GIVE_JOINTS = Remedy(
+    "joints", "name each joint's counterpart in the standard with {}", "{'Pelvis': 'HumanoidRoot', ...}"
+)
 
 
 @cache
 def families() -> dict[str, dict[str, str]]:
     """Return by family: simplified source name -> joint of the standard."""
     result: dict[str, dict[str, str]] = {}
-    text = (files(__package__) / "joint_names.csv").read_text(encoding="utf-8")
-    for row in csv.DictReader(text.splitlines()):
+    for row in read_table(__package__, "joint_names.csv"):
         family = result.setdefault(row["family"], {})
-        sides = re.search(r"\((\w+)\|(\w+)\)", row["source"])
-        if sides is None:
-            family[simplify(row["source"])] = row["joint"]
-            continue
-        for side, word in zip("lr", sides.groups(), strict=True):
-            source = row["source"].replace(sides[0], word)
+        for side, source in both_sides(row["source"]):
             family[simplify(source)] = row["joint"].replace("?", side)
     result["h-anim"] = {simplify(joint.name): joint.name for joint in joints()}
     return result
-
-
-def simplify(name: str) -> str:
-    """Return a name in lower case, letters and digits only: "mixamorig:LeftUp_Leg" -> "leftupleg"."""
-    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
 
 
 def match(names: Sequence[str]) -> tuple[str, dict[str, int]]:
@@ -69,19 +59,13 @@ def match(names: Sequence[str]) -> tuple[str, dict[str, int]]:
                 joint = table.get(name)
                 if joint is not None:
                     mapped.setdefault(joint, number)
-            if len(mapped) > len(best[1]) and all(joint in mapped for joint in REQUIRED):
+            if len(mapped) > len(best[1]) and ROOT in mapped:
                 best = (family, mapped)
     if len(best[1]) < MIN_NAMES:
         first_names = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
         raise ModelError(
             f"no known skeleton family fits these {len(names)} joint names: {first_names}"
-        ).with_remedies(
-            Remedy(
-                "joints",
-                "name each joint's counterpart in the standard with {}",
-                "{'Pelvis': 'HumanoidRoot', ...}",
-            )
-        )
+        ).with_remedies(GIVE_JOINTS)
     return best
 
 

@@ -13,7 +13,10 @@ from fba import rotations
 from fba.arrays import Float64, Int64, Intp
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.tracks import FaceTrack
+from fba.tracks import FaceTrack, freeze
+
+SAMPLE_FRAMES = 400
+"""Number of frames, spread evenly, that are examined in place of a whole motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,17 +24,17 @@ class SkeletonMotion:
     """Motion of joints, in the units and the coordinate frame of the source.
 
     names: J joint names. parents: int64 (J,), -1 for the root, which comes first; parents come before
-        children. offsets: float64 (J, 3), from the parent, in the rest pose (all rotations identity).
-    rotations: float64 (T, J, 4), unit quaternions (w, x, y, z) relative to the parent.
-    positions: float64 (T, 3), of the root. rate: frames per second.
-    end_parents: int64 (E,), end_offsets: float64 (E, 3): ends of the last bones, where known.
-    name: of the performance. declared: joint name -> joint of the standard, where the file itself says which
-        bone is which; empty where names must tell.
-    axes: float64 (J, 4), quaternions of the joints' own axes in the rest pose,
-        in the frame of the source; empty for the frame's own axes. posed: whether the rest pose may be any
-        pose, since the source does not say which it is. up: the axis that the format says is up, such as
-        "+y"; empty where it says nothing. face: returns the FAPs of the same person at times (F,), seconds
-        from the first frame, or None if the face does not move; None where the source has no face.
+    children. offsets: float64 (J, 3), from the parent, in the rest pose (all rotations identity). rotations:
+    float64 (T, J, 4), unit quaternions (w, x, y, z) relative to the parent. positions: float64 (T, 3), of the
+    root. rate: frames per second. end_parents: int64 (E,), end_offsets: float64 (E, 3): ends of the last
+    bones, where known. name: of the performance.
+
+    declared: joint name -> joint of the standard, where the file itself says which bone is which; empty where
+    names must tell. axes: float64 (J, 4), quaternions of the joints' own axes in the rest pose, in the frame
+    of the source; empty for the axes of the frame. posed: whether the rest pose may be any pose, since the
+    source does not say which it is. up: the axis that the format says is up, such as "+y"; empty where it
+    says nothing. face: returns the FAPs of the same person at times (F,), seconds from the first frame, or
+    None if the face does not move; None where the source has no face.
 
     Raises ModelError if the parts contradict each other or are not finite.
     """
@@ -52,37 +55,26 @@ class SkeletonMotion:
     face: Callable[[Float64], FaceTrack | None] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "declared", dict(self.declared))
         count = len(self.names)
+        freeze(self, declared=dict(self.declared), rate=Fraction(self.rate))
         if not np.size(self.axes):
-            object.__setattr__(self, "axes", np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
-        for what, kind in (
-            ("parents", np.int64),
-            ("offsets", np.float64),
-            ("rotations", np.float64),
-            ("positions", np.float64),
-            ("end_parents", np.int64),
-            ("end_offsets", np.float64),
-            ("axes", np.float64),
+            freeze(self, axes=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
+        frames, ends = len(self.positions), len(self.end_parents)
+        for what, kind, shape in (
+            ("parents", np.int64, (count,)),
+            ("offsets", np.float64, (count, 3)),
+            ("rotations", np.float64, (frames, count, 4)),
+            ("positions", np.float64, (frames, 3)),
+            ("end_parents", np.int64, (ends,)),
+            ("end_offsets", np.float64, (ends, 3)),
+            ("axes", np.float64, (count, 4)),
         ):
             array = np.array(getattr(self, what), dtype=kind)
             if not np.isfinite(array).all():
                 raise ModelError(f"SkeletonMotion: {what} must be finite")
-            array.flags.writeable = False
-            object.__setattr__(self, what, array)
-        object.__setattr__(self, "rate", Fraction(self.rate))
-        frames, ends = len(self.positions), len(self.end_parents)
-        for what, shape in (
-            ("parents", (count,)),
-            ("offsets", (count, 3)),
-            ("rotations", (frames, count, 4)),
-            ("positions", (frames, 3)),
-            ("end_parents", (ends,)),
-            ("end_offsets", (ends, 3)),
-            ("axes", (count, 4)),
-        ):
-            if getattr(self, what).shape != shape:
-                raise ModelError(f"SkeletonMotion: {what} has shape {getattr(self, what).shape}, not {shape}")
+            if array.shape != shape:
+                raise ModelError(f"SkeletonMotion: {what} has shape {array.shape}, not {shape}")
+            freeze(self, **{what: array})
         if count == 0 or self.rate <= 0:
             raise ModelError("SkeletonMotion: needs a joint at least, and a positive rate")
         numbers = np.arange(count)
@@ -124,12 +116,12 @@ class SkeletonMotion:
         turned = rotations.interpolate(self.rotations, before, after, weight)
         return replace(self, rate=rate, rotations=turned, positions=positions)
 
-    def spread(self, most: int) -> Intp:
+    def spread(self, most: int = SAMPLE_FRAMES) -> Intp:
         """Return the numbers of at most `most` frames, spread evenly over the motion."""
         return np.unique(np.linspace(0, len(self) - 1, min(len(self), most)).astype(np.intp))
 
     def select(self, rows: slice | Intp) -> SkeletonMotion:
-        """Return some frames of the motion, without the face, whose times they no longer have."""
+        """Return some frames of the motion, without the face: its times would be wrong."""
         if isinstance(rows, slice) and rows.indices(len(self)) == (0, len(self), 1):
             return self
         return replace(self, rotations=self.rotations[rows], positions=self.positions[rows], face=None)
@@ -151,6 +143,14 @@ class SkeletonMotion:
             positions[:, joint] = positions[:, parent] + offset
         turned.flags.writeable = positions.flags.writeable = False
         return turned, positions
+
+    def descendants(self, joint: int) -> list[int]:
+        """Return a joint and all joints below it, parents first."""
+        found = [joint]
+        for number in range(joint + 1, len(self.names)):
+            if int(self.parents[number]) in found:
+                found.append(number)
+        return found
 
     def rest(self) -> Float64:
         """Return joint positions (J, 3) in the rest pose, the root at its offset."""

@@ -1,7 +1,7 @@
-"""Prepare a captured motion: which joint is which, which way is up, and what the rest pose is.
+"""Prepare a captured motion: find which joint is which, which axis points up, and the rest pose.
 
-The result is a motion with y up, whose rest pose is one that a person can take, so that what follows need not
-ask again. Each answer has a confidence; below `MIN_CONFIDENCE` the motion is refused with what was seen.
+The result is a motion with y up, whose rest pose a person can take. Each answer has a confidence; below
+`MIN_CONFIDENCE` the motion is refused, and the error says what was seen.
 """
 
 from __future__ import annotations
@@ -16,20 +16,19 @@ from fba import rotations
 from fba.arrays import Float64
 from fba.body import Skeleton
 from fba.body.skeleton import ROOT
+from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _standing as standing
 from fba.capture import matching
 from fba.capture._rest_correction import correct_rest
 from fba.capture._rest_from_motion import rest_from_motion, with_rest
-from fba.capture._up_axis import UPS, find_up_axis, nearest_axis, turn_axes
-from fba.capture.bones import check_extent, find_bones, joints_remedy, refuse_swapped_sides
+from fba.capture._up_axis import UPS, find_up_axis, find_upright, nearest_axis, turn_axes
+from fba.capture.bones import check_extent, find_bones, refuse_swapped_sides
 from fba.capture.motion import SkeletonMotion, read_axis
 from fba.choices import SignedUpAxis
 from fba.errors import FbaWarning, ModelError, Remedy
 
 MIN_CONFIDENCE = 0.5
 """Smallest confidence, 0 to 1, with which a motion is accepted."""
-SAMPLE_FRAMES = 400
-"""Number of frames, spread evenly over the motion, that are examined."""
 RESTS = ("auto", "file", "first", "motion")
 MAX_POSED_DISTANCE = 3.0
 """Largest distance from standing, in degrees, of a rest pose that a file may store in any pose."""
@@ -38,17 +37,19 @@ MAX_FIRST_FRAME_DISTANCE = 4.0
 MAX_POSE_DIFFERENCE = 0.01
 """Share of the skeleton's size within which a rest pose equals a frame of the motion."""
 MAX_ROW_TURN = {"hip": 25.0, "shoulder": 45.0}
-"""Largest average turn, in degrees, of the row of hips or shoulders from the rest pose, seen from the joint
-above them. In real files hips differ by up to 6, shoulders by up to 8."""
+"""Largest average turn, in degrees, of the row of hips or shoulders from the rest pose, relative to the joint
+above them. In real files it is up to 6 for hips, up to 8 for shoulders."""
+MAX_ARM_TILT = 10.0
+"""Largest angle, in degrees, between an arm in a T-pose and the side."""
 
 
 @dataclass(frozen=True, eq=False)
 class Preparation:
-    """A motion that is ready to be retargeted, and what was found out about it.
+    """A motion that is ready to be retargeted, and how it was understood.
 
     motion: y up, with a rest pose that a person can take. mapped: joint of the body -> number of the source's
-    joint. family: that of the joint names, "words" if they were read word by word, empty if joints were
-    given. rest: "file", "first", "motion" or "frame 12". up: the source's axis, such as "+z". confidence: of
+    joint. family: of the joint names; "words" if they were read word by word, empty if the caller gave the
+    joints. rest: "file", "first", "motion" or "frame 12". up: the source's axis, such as "+z". confidence: of
     "bones", "up" and "rest", 0 to 1. reasons: of the same, for people.
     """
 
@@ -69,7 +70,7 @@ def prepare(
     rest: str | int = "auto",
     up: SignedUpAxis = "auto",
 ) -> Preparation:
-    """Return a motion made ready, see `Preparation`.
+    """Return the motion prepared for retargeting.
 
     joints: source joint -> joint of the standard; None to find them. rest: "auto", "file" for the file's own
     rest pose, "first" for its first frame, a number for another frame, "motion" to work it out from the
@@ -93,15 +94,15 @@ def prepare(
     bones = find_bones(motion, joints, skeleton)
     mapped = bones.joints
     confidence, reasons = {"bones": bones.confidence}, {"bones": bones.reason}
-    few = motion.select(motion.spread(SAMPLE_FRAMES))
-    quaternions, positions = few.world()
+    sample = motion.select(motion.spread())
+    quaternions, positions = sample.world()
     at_rest = standing.measure(motion.rest()[None], mapped)
     found_up = find_up_axis(motion, positions, mapped, at_rest, up)
     axis, confidence["up"], reasons["up"] = found_up.axis, found_up.confidence, found_up.reason
     turn = rotations.between(read_axis(axis), np.array([0.0, 1.0, 0.0]))
     level = motion if axis == "+y" else turn_axes(motion, turn)
     if joints is None:
-        refuse_swapped_sides(few, mapped)
+        refuse_swapped_sides(sample, mapped)
     chosen, confidence["rest"], reasons["rest"] = _choose_rest(
         motion, quaternions, positions, mapped, at_rest, rest
     )
@@ -131,27 +132,19 @@ def prepare(
 
 
 def rest_on_frame(motion: SkeletonMotion, other: SkeletonMotion, frame: int) -> SkeletonMotion:
-    """Return a motion whose rest pose is a frame of another of the same skeleton, or of itself."""
+    """Return a motion whose rest pose is a frame of another motion of its skeleton, or of itself."""
     row = other.select(slice(frame, frame + 1))
     return with_rest(motion, rotations.matrices(row.world()[0][0]))
 
 
 def _refuse_doubt(result: Preparation, given_joints: bool, given_rest: bool, given_up: bool) -> None:
-    """Raise ModelError for the first answer that is not sure enough, unless it was given."""
+    """Raise ModelError for the first answer that is not sure enough, unless the caller gave it."""
+    give_up = Remedy("up", "say which axis points up with {}", "'+y'")
+    give_rest = Remedy("rest", "if a frame shows a T-pose, or somebody who stands, say which with {}", "0")
     for what, given, finding, remedy in (
-        ("bones", given_joints, "which joint is which is not clear", joints_remedy()),
-        (
-            "up",
-            given_up,
-            "which way is up is not clear",
-            Remedy("up", "say which axis points up with {}", "'+y'"),
-        ),
-        (
-            "rest",
-            given_rest,
-            "the rest pose is not clear",
-            Remedy("rest", "if a frame shows a T-pose, or somebody who stands, say which with {}", "0"),
-        ),
+        ("bones", given_joints, "which joint is which is not clear", matching.GIVE_JOINTS),
+        ("up", given_up, "which way is up is not clear", give_up),
+        ("rest", given_rest, "the rest pose is not clear", give_rest),
     ):
         if not given and result.confidence[what] < MIN_CONFIDENCE:
             raise ModelError(
@@ -168,7 +161,7 @@ def _choose_rest(
     at_rest: standing.Stance,
     rest: str | int,
 ) -> tuple[str, float, str]:
-    """Return the rest pose to use ("file", "first", "motion" or as given), the confidence and a reason.
+    """Return the rest pose to use ("file", "first", "motion" or `rest`), the confidence and a reason.
 
     quaternions, positions: (T, J, 4), (T, J, 3), of the source in the world.
     """
@@ -206,10 +199,10 @@ def _choose_rest(
 def _find_turned_row(
     motion: SkeletonMotion, quaternions: Float64, positions: Float64, mapped: Mapping[str, int]
 ) -> tuple[str, float] | None:
-    """Return which row, hips or shoulders, is turned from the rest pose, and by how many degrees; else None.
+    """Return the row that is turned from the rest pose, hips or shoulders, and by how many degrees; or None.
 
-    Rotations fitted to positions of joints may turn the pelvis aside and its hips back. The file's rest
-    pose then says nothing.
+    Rotations that were fitted to positions of joints may turn the pelvis aside and its hips back. The file's
+    rest pose then says nothing.
     """
     at_rest = motion.rest()
     for joint, most in MAX_ROW_TURN.items():
@@ -224,11 +217,11 @@ def _find_turned_row(
     return None
 
 
-def _common_parent(motion: SkeletonMotion, one: int, other: int) -> int:
+def _common_parent(motion: SkeletonMotion, first: int, second: int) -> int:
     """Return the number of the nearest joint above both joints, or -1."""
-    while one != other:
-        one, other = int(motion.parents[max(one, other)]), min(one, other)
-    return one
+    while first != second:
+        first, second = int(motion.parents[max(first, second)]), min(first, second)
+    return first
 
 
 def _arms_out(positions: Float64, mapped: Mapping[str, int], stance: standing.Stance) -> bool:
@@ -237,6 +230,32 @@ def _arms_out(positions: Float64, mapped: Mapping[str, int], stance: standing.St
         if f"{side}_shoulder" not in mapped or f"{side}_wrist" not in mapped:
             return False
         arm = rotations.unit(positions[mapped[f"{side}_wrist"]] - positions[mapped[f"{side}_shoulder"]])
-        if float(arm @ stance.left[0]) * sign < np.cos(np.radians(10.0)):
+        if float(arm @ stance.left[0]) * sign < np.cos(np.radians(MAX_ARM_TILT)):
             return False
     return True
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A skeleton at rest; `find_rest` makes it.
+
+    mapped: joint of the body -> number of the source's joint. positions: float64 (J, 3), of the source's
+    joints at rest, in its unit, y up, facing +z. corrections: joint of the body -> rotation (3, 3) from the
+    default posture to the rest pose, in the same axes. turn: (3, 3), from the source's frame to those axes.
+    """
+
+    mapped: Mapping[str, int]
+    positions: Float64
+    corrections: Mapping[str, Float64]
+    turn: Float64
+
+
+def find_rest(motion: SkeletonMotion, skeleton: Skeleton, joints: Mapping[str, str] | None = None) -> Rest:
+    """Return how a skeleton rests. joints: as for `from_skeleton`. ModelError as `from_skeleton`."""
+    mapped = find_bones(motion, joints, skeleton).joints
+    upright = find_upright(motion, mapped)
+    alignment = rest_alignment.align(turn_axes(motion, upright), mapped, skeleton)
+    ahead = alignment.corrections["sacroiliac"].T
+    corrections = {joint: ahead @ correction for joint, correction in alignment.corrections.items()}
+    turn = ahead @ upright
+    return Rest(mapped, motion.rest() @ turn.T, corrections, turn)

@@ -1,4 +1,4 @@
-"""Captures at their own times: their nominal rates, their gaps, and their values at the times of frames."""
+"""Captures at irregular times: their nominal rates, their gaps, and their values at the times of frames."""
 
 from __future__ import annotations
 
@@ -17,21 +17,19 @@ NOMINAL = tuple(
            | {Fraction(n) for n in (180, 200, 240, 250, 300, 480, 500, 1000)}
            | {Fraction(n * 1000, 1001) for n in (24, 30, 60)})
 )  # fmt: skip
-"""Frame rates, one of which the median step of a capture probably means."""
+"""Usual frame rates; the median step of a capture probably means one of them."""
 MAX_RATE_ERROR = 0.01
 """Largest relative difference between a measured rate and the nominal rate that it is taken for."""
-EXACT = 1e-4
-"""The same for rates that differ by a thousandth, as 30 and 29.97."""
 GAP = 2.5
-"""Steps of the nominal rate above which frames are missing."""
-BRIDGED = 0.5
-"""Seconds of the longest gap that is filled by a straight line."""
-RETURN = 0.2
-"""Seconds before the end of a longer gap in which the face goes over from what it held."""
+"""Smallest gap between rows, in steps of the nominal rate, in which frames are missing."""
+MAX_BRIDGED = 0.5
+"""Longest gap, in seconds, that a straight line fills."""
+RETURN_SECONDS = 0.2
+"""Seconds before the end of a longer gap in which the face moves to its new place."""
 TIME_TOLERANCE = 1e-6
-"""Share of a frame by which a time may miss a frame's and still be it."""
+"""Largest difference, as a share of a frame, between a time and that of the frame that it means."""
 CELL_BYTES = 40
-"""Memory that resampling takes for each value."""
+"""Memory, in bytes, that resampling takes for each value."""
 
 
 def find_rate(times: Float64) -> Fraction:
@@ -44,17 +42,16 @@ def find_rate(times: Float64) -> Fraction:
     rate = 1.0 / float(np.median(np.diff(times)))
     if not 0.1 <= rate <= 10_000:
         raise ModelError(f"the rows are {1 / rate:.3g} s apart, {rate:.3g} frames/s: no times in seconds")
-    for bound in (EXACT, MAX_RATE_ERROR):
-        near = min(NOMINAL, key=lambda one: abs(float(one) - rate))
-        if abs(float(near) - rate) <= bound * rate:
-            return near
+    near = min(NOMINAL, key=lambda nominal: abs(float(nominal) - rate))
+    if abs(float(near) - rate) <= MAX_RATE_ERROR * rate:
+        return near
     return Fraction(round(rate)) if rate >= 1 else Fraction(rate).limit_denominator(1000)
 
 
 def find_gaps(times: Float64, rate: Fraction) -> list[tuple[float, float]]:
-    """Return gaps between rows at times (T,): the time of the row before each, and its seconds."""
+    """Return gaps between rows at times (T,): the time of the row before each, and its length in seconds."""
     steps = np.diff(times)
-    return [(float(times[one]), float(steps[one])) for one in np.flatnonzero(steps * float(rate) >= GAP)]
+    return [(float(times[row]), float(steps[row])) for row in np.flatnonzero(steps * float(rate) >= GAP)]
 
 
 def frame_numbers(times: Float64, rate: Fraction, limits: Limits) -> Int64:
@@ -71,12 +68,12 @@ def frame_numbers(times: Float64, rate: Fraction, limits: Limits) -> Int64:
 
 
 def interpolate(times: Float64, values: Sequence[Float64], at: Float64, limits: Limits) -> list[Float64]:
-    """Return arrays of values (T, ...) at times (T,) as they are at other times (F,), on straight lines.
+    """Return arrays of values (T, ...) at times (T,), interpolated linearly at other times (F,).
 
-    Over a gap of more than `BRIDGED` seconds values stay, and go over at its end. Before the first row and
-    after the last they are those of these rows.
+    In a gap longer than `MAX_BRIDGED` values stay, and change at its end. Before the first row and after the
+    last, they are those of that row.
     """
-    width = sum(one[0].size for one in values) if len(times) else 0
+    width = sum(array[0].size for array in values) if len(times) else 0
     limits.check_bytes(
         CELL_BYTES * width * len(at), "the capture, resampled,", source=CELL_BYTES * width * len(times)
     )
@@ -84,10 +81,10 @@ def interpolate(times: Float64, values: Sequence[Float64], at: Float64, limits: 
     before = after - 1
     after = np.minimum(after, len(times) - 1)
     length = times[after] - times[before]
-    spread = np.where(length > BRIDGED, RETURN, length)
+    spread = np.where(length > MAX_BRIDGED, RETURN_SECONDS, length)
     share = np.clip(1 - (times[after] - at) / np.where(spread > 0, spread, 1.0), 0.0, 1.0)
     result = []
-    for one in values:
-        weight = share.reshape(-1, *[1] * (one.ndim - 1))
-        result.append(one[before] * (1 - weight) + one[after] * weight)
+    for array in values:
+        weight = share.reshape(-1, *[1] * (array.ndim - 1))
+        result.append(array[before] * (1 - weight) + array[after] * weight)
     return result

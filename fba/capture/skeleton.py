@@ -71,15 +71,13 @@ def from_skeleton(
     Bones point in the directions of the source's bones. Where the source turns about an axis that a joint
     lacks, the joint before or after it turns instead. BAPs 181..183 are millimetres from the default standing
     position. Angles are within +-pi; they are not clamped to the standard's ranges. A skeleton of the
-    standard's own joints that rests in the default posture (see `is_direct`) is converted
-    joint for joint, wherever its feet are: ground has no effect, and spine only if it is "simple", "full" or
-    a number.
+    standard's joints that rests in the default posture (see `is_direct`) is converted joint for joint,
+    wherever its feet are: ground has no effect, and spine only if it is "simple", "full" or a number.
 
     Raises ModelError if no family of names fits, the root of the solver's skeleton is not HumanoidRoot, the
     source has no size or there are more than 500,000 frames, LimitError for more than the limits allow,
-    ValueError for a bad option or joint name. Warns
-    (FbaWarning) of missing joints of a limb: they stay in the default posture.
-    `fba.capture.retarget_report` measures how close the result comes.
+    ValueError for a wrong option or joint name. Warns (FbaWarning) of missing joints of a limb: they stay in
+    the default posture. `fba.capture.retarget_report` measures how close the result comes.
     """
     return retarget_motion(motion, rate, SkeletonOptions(**options), solver=solver, limits=limits).animation
 
@@ -92,7 +90,7 @@ def retarget_motion(
     solver: BapSolver | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Captured:
-    """Return what `from_skeleton` does, together with the motion and the bones that were found."""
+    """Return the animation that `from_skeleton` makes, with the motion and its preparation."""
     options = options if options is not None else SkeletonOptions()
     solver = solver if solver is not None else BapSolver()
     rate = motion.rate if rate is None else Fraction(rate)
@@ -116,7 +114,7 @@ def retarget_motion(
 
 
 def _needs_no_retargeting(motion: SkeletonMotion, options: SkeletonOptions, solver: BapSolver) -> bool:
-    """Whether a motion is of the standard's own joints, and no option asks for more."""
+    """Whether a motion has the standard's joints, and no option asks for more."""
     return (
         options.joints is None
         and not motion.declared
@@ -127,7 +125,7 @@ def _needs_no_retargeting(motion: SkeletonMotion, options: SkeletonOptions, solv
 
 
 def _warn_of_missing(mapped: Mapping[str, int]) -> None:
-    """Warn of the joints that limbs lack of which others are known."""
+    """Warn of missing joints of limbs that have others."""
     missing = [
         joint for limb in LIMBS for joint in limb if any(j in mapped for j in limb) and joint not in mapped
     ]
@@ -150,8 +148,8 @@ def _check_frames(motion: SkeletonMotion, rate: Fraction, limits: Limits) -> Non
             "cut it into pieces, or give a lower rate"
         )
     if frames > len(motion):
-        own_bytes = motion.rotations.nbytes + motion.positions.nbytes
-        check_memory(limits, frames, len(motion.names), f"the motion at {float(rate):g} frames/s", own_bytes)
+        source = motion.rotations.nbytes + motion.positions.nbytes
+        check_memory(limits, frames, len(motion.names), f"the motion at {float(rate):g} frames/s", source)
 
 
 def solve_targets(
@@ -185,9 +183,9 @@ def check_memory(limits: Limits, frames: int, joints: int, what: str, source: in
 def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
     """Return whether the joints are the standard's, by name and hierarchy, and rest in the default posture.
 
-    Files that this project writes are of this kind, and so is motion of any H-Anim figure that rests in the
-    default posture. Retargeting would move the spine's rotations to other vertebrae, and turn clavicles and
-    forearms as other skeletons need it. A motion without all limbs is not converted directly.
+    This holds for files that this project writes, and for motion of H-Anim figures that rest in the default
+    posture. Retargeting would move the spine's rotations to other vertebrae, and turn clavicles and forearms
+    as other skeletons need it. A motion without all limbs is not converted directly.
     """
     names = motion.names
     known = len(set(names)) == len(names) and all(name in skeleton for name in names)
@@ -202,9 +200,9 @@ def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
     if not all(upper in names and lower in names for upper, lower in LIMB_BONES):
         return False
     for upper, lower in LIMB_BONES:
-        theirs = motion.offsets[names.index(lower)]
-        ours = skeleton.centres[skeleton.number(lower)] - skeleton.centres[skeleton.number(upper)]
-        if not theirs @ ours >= MIN_REST_COSINE * float(np.linalg.norm(theirs) * np.linalg.norm(ours)) > 0:
+        source = motion.offsets[names.index(lower)]
+        body = skeleton.centres[skeleton.number(lower)] - skeleton.centres[skeleton.number(upper)]
+        if not source @ body >= MIN_REST_COSINE * float(np.linalg.norm(source) * np.linalg.norm(body)) > 0:
             return False
     return True
 

@@ -18,7 +18,7 @@ from importlib.resources import files
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
-from fba.capture.action_units.conversion import unit_shapes
+from fba.capture.blendshapes.action_units import unit_shapes
 from fba.emotion._features import features, known_features, measure
 from fba.emotion._profiles import measured_faps, measurements
 from fba.emotion.expression import FAMILIES

@@ -1,4 +1,4 @@
-"""`Capture`: datagrams as they arrive to frames as they are complete, with a count of all faults."""
+"""`Capture`: makes frames of datagrams as they arrive, and counts faults."""
 
 from __future__ import annotations
 

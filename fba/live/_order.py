@@ -1,4 +1,4 @@
-"""Samples in the order of the sender's clock: late, duplicate and stray datagrams, clocks that jump."""
+"""`SampleOrder`: samples in the order of the sender's clock, despite late datagrams and clocks that jump."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ Timed = tuple[float, Sample]
 class SampleOrder:
     """Gives times to the samples of a sender, and puts them in order.
 
-    rate: the sender's frames per second. doubled, late, reordered: counts of datagrams that came twice, too
-    late to be used, and after a later one. strayed: count of those whose time no other confirms. jumps: how
-    often the sender's clock was set.
+    rate: the sender's frames per second. Counts of datagrams: doubled, that came twice; late, too late to be
+    used; reordered, after a later datagram; strayed, whose time no other confirms. jumps: count of the times
+    the sender's clock was set.
     """
 
     def __init__(self, rate: Fraction) -> None:
@@ -43,7 +43,7 @@ class SampleOrder:
         self._period = 1.0 / float(rate)
         self._offset: float | None = None  # seconds of the sender's clock that are our 0
         self._newest = 0.0
-        self._newest_at = 0.0  # on our own clock
+        self._newest_at = 0.0  # on our clock
         self._aside: tuple[float, Sample] | None = None
         self._waiting: list[tuple[float, int, Sample]] = []
         self._count = 0
@@ -65,7 +65,7 @@ class SampleOrder:
         return self._take(0)
 
     def _place(self, sample: Sample, now: float) -> list[Timed]:
-        """Return samples with their times: the given one, and one that it confirms; empty if unconfirmed."""
+        """Return samples with their times: this sample, and another that it confirms; none if unconfirmed."""
         if self._offset is None:
             self._offset, self._newest_at = sample.seconds, now
             return [(0.0, sample)]
@@ -108,7 +108,7 @@ class SampleOrder:
         insort(self._waiting, (time, self._count, sample))
 
     def _take(self, waiting: int) -> list[Timed]:
-        """Return samples in order, except at most `waiting` that wait for an earlier one."""
+        """Return samples in order, but keep at most `waiting` that wait for an earlier sample."""
         ready = []
         while self._waiting:
             time, _, sample = self._waiting[0]

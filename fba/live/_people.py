@@ -31,7 +31,7 @@ START_SECONDS = 1.0
 CHUNK_FRAMES = 256
 """Number of frames that are computed at once."""
 MIN_SHAPES = 5
-"""Number of shapes with ARKit's names from which other expressions, which repeat them, are left out."""
+"""Smallest number of shapes with ARKit's names that replace other expressions, which only repeat them."""
 OLD_NAMES = {
     "a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed",
     "blink_l": "blinkLeft", "blink_r": "blinkRight",
@@ -40,7 +40,7 @@ OLD_NAMES = {
 MIN_OFFSET = 1e-3
 """Smallest length of a bone, metres."""
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
-EYES = ("LeftEye", "RightEye")
+EYE_BONES = ("LeftEye", "RightEye")
 
 
 class PersonConversion:
@@ -193,7 +193,7 @@ class _Face:
             turn = rotations.matrices(_world(sample, ("Neck", "Head")))
             head = np.array(_angles(turn))
         (left_pitch, left_yaw, _), (right_pitch, right_yaw, _) = (
-            _angles(rotations.matrices(_world(sample, (eye,)))) for eye in EYES
+            _angles(rotations.matrices(_world(sample, (eye,)))) for eye in EYE_BONES
         )
         return weights, head, np.array([left_yaw, right_yaw, left_pitch, right_pitch])
 
@@ -238,10 +238,7 @@ class _Body:
 
     def _above(self, name: str) -> int:
         """Return the number of the nearest bone above that is sent; -1 for the hips."""
-        above = unity_bones.parents()[name]
-        while above and above not in self._names:
-            above = unity_bones.parents()[above]
-        return self._names.index(above) if above else -1
+        return next((self._names.index(bone) for bone in unity_bones.above(name) if bone in self._names), -1)
 
     def convert(
         self, samples: list[Sample], before: Intp, after: Intp, weight: Float64, rate: Fraction
@@ -286,15 +283,6 @@ def standard_offsets(names: Sequence[str], parents: Sequence[int]) -> Float64:
             continue
         offsets[number] = centre(name) - centre(names[parent])
         side = "Left" if name.startswith("Left") else "Right"
-        if _below_arm(names[parent], side):
+        if f"{side}UpperArm" in (names[parent], *unity_bones.above(names[parent])):
             offsets[number] = raised[side] @ offsets[number]
     return offsets
-
-
-def _below_arm(bone: str, side: str) -> bool:
-    """Return whether a bone is the upper arm of a side or below it."""
-    while bone:
-        if bone == f"{side}UpperArm":
-            return True
-        bone = unity_bones.parents()[bone]
-    return False

@@ -107,16 +107,13 @@ class Receiver:
 
     def drain(self) -> None:
         """Process the datagrams that have arrived, without waiting."""
-        self._take_all()
-        self.capture.settle()
-
-    def _take_all(self) -> None:
         for data, address in self._arrived(BATCH):
             self.capture.receive(data, str(address[0]), self._clock())
         if self._socket is not None:
             dropped = _dropped(self._socket)
             if dropped is not None:
                 self.capture.summary.dropped = dropped
+        self.capture.settle()
 
     def _arrived(self, most: int) -> Iterator[tuple[bytes, tuple[Any, ...]]]:
         """Yield at most `most` datagrams that have arrived, with their senders' addresses."""

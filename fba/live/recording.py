@@ -14,8 +14,8 @@ from fba.errors import OptionError
 from fba.planning import LiveEncoder
 from fba.planning.rate import RateEncoder
 
-MIN_RATE = Fraction(1)
-MAX_RATE = Fraction(240)
+RATE_RANGE = Fraction(1), Fraction(240)
+"""Smallest and largest frame rate of a stream."""
 
 
 class Target(Protocol):
@@ -155,8 +155,8 @@ class StreamRecorder:
 
 
 def stream_rate(rate: Fraction) -> Fraction:
-    """Return the frame rate, 1 to 240, that a stream can have and that is nearest to a sender's."""
-    near = min(max(rate, MIN_RATE), MAX_RATE)
+    """Return the frame rate of a stream, 1 to 240, nearest to that of a sender."""
+    near = min(max(rate, RATE_RANGE[0]), RATE_RANGE[1])
     return near if FrameRate.from_fraction(near) is not None else Fraction(round(16 * near), 16)
 
 
@@ -168,7 +168,7 @@ def _write_all(file: BinaryIO, data: bytes) -> None:
 
 
 def warm_up(*, bodies: bool = False, rated: bool = False, compact: bool = False) -> None:
-    """Compile the encoder of faces, and of bodies, before datagrams come, which would be lost meanwhile.
+    """Compile the encoder of faces, and of bodies, since datagrams that come meanwhile would be lost.
 
     rated: for a bit rate. compact: as of `StreamRecorder`.
     """

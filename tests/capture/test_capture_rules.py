@@ -49,7 +49,7 @@ def targets(**joints: np.ndarray) -> Targets:
     return Targets(BapSolver(), motion, {"l_wrist": 0}, aims, still, np.zeros((count, 1, 3)), joints, {})
 
 
-def test_a_foot_points_where_it_is_to_within_a_thousandth_of_a_degree() -> None:
+def test_a_foot_points_in_its_target_direction() -> None:
     angles = [[0.5, 0.3, 0.2], [-0.4, -0.3, 0.5], [0.3, 0.6, -0.4]]
     foot = Rotation.from_euler("ZYX", angles).as_matrix()
     body = targets(l_ankle=foot)
@@ -116,7 +116,7 @@ def test_the_ground_is_at_the_lowest_fifth_of_the_heights() -> None:
 
 
 @pytest.mark.parametrize(("height", "found"), [(0.14, 0.14), (0.16, 0.0), (-0.14, -0.14), (-0.96, -0.96)])
-def test_ground_far_above_zero_is_none(height: float, found: float) -> None:
+def test_feet_far_above_zero_are_on_no_ground(height: float, found: float) -> None:
     """A chair, or a leap that the capture begins in; below 0 there is nothing else to stand on."""
     assert ground_under(np.full(50, height), np.zeros(50)).height == pytest.approx(found)
 

@@ -84,7 +84,7 @@ def test_a_result_as_it_should_be_is_good(
         ("l_sternoclavicular_abduct", 30, "clavicle", "left clavicle", 30),
     ],
 )
-def test_what_is_off_all_the_time_is_seen(
+def test_a_constant_difference_is_seen(
     source: SkeletonMotion, result: Animation, mapped: dict[str, int], bap: str, value: float, measure: str,
     part: str, worst: float,
 ) -> None:  # fmt: skip
@@ -170,7 +170,7 @@ def test_a_limb_that_was_not_matched_is_seen(source: SkeletonMotion, result: Ani
     assert "1 moving joints are left over" in find(comparison, "unmatched", "left leg").sentence
 
 
-def test_the_way_up_comes_from_the_motion_before_the_rest_pose(mapped: dict[str, int]) -> None:
+def test_the_motion_shows_up_before_the_rest_pose(mapped: dict[str, int]) -> None:
     """Z up, in a file whose rest pose lies along x."""
     lying = Rotation.from_euler("z", -90, degrees=True)
     for world, expected in (
@@ -251,7 +251,7 @@ def test_sticks_stand_where_the_result_stands(
     assert abs(near.soles[0][:, 1].mean()) < 0.03
 
 
-def test_a_palm_that_is_off_all_the_time_is_seen_without_fingers(
+def test_a_constant_turn_of_a_palm_is_seen_without_fingers(
     source: SkeletonMotion, result: Animation, mapped: dict[str, int]
 ) -> None:
     """The rest pose stands, so its palms face the thighs."""

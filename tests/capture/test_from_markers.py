@@ -15,11 +15,9 @@ from fba.capture.markers import _stabilisation as stabilisation
 from fba.capture.markers._eyes import opening_by_blinks
 from fba.capture.markers._faces import MarkerFace, find_face
 from fba.capture.markers._gaps import fill_gaps
-from fba.capture.markers._responses import JAW_VALUES
-from fba.capture.markers._solving import jaw_curves
+from fba.capture.markers._solving import JAW_VALUES, jaw_curves
 from fba.capture.markers._targets import RIGID
-from fba.capture.markers.marker_maps import change_map, find_map, marker_sets, read_map, write_map
-from fba.capture.markers.summary import summarise
+from fba.capture.markers.marker_maps import change_map, find_map, marker_sets, read_map, summarise, write_map
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError
 from fba.face import Deformer, FaceModel
 from fba.face.authoring import author
@@ -86,7 +84,7 @@ def test_with_noise() -> None:
     check(face, take(), 50)
 
 
-def test_the_jaw_goes_back_as_the_actors_own() -> None:
+def test_the_jaw_goes_back_as_far_as_the_actors() -> None:
     """From where chin and ears are, against the motion of two heads whose chins go back by 1.2 and 1.5."""
     for head in (actor(), FaceModel.default()):
         moved = Deformer(head).feature_points(np.eye(68)[2] * 1000, local=True)
@@ -116,7 +114,7 @@ def lid(times: np.ndarray, blinks: dict[float, float], length: float = 0.2) -> n
     return sunk
 
 
-def test_blinks_tell_how_far_eyes_are_open() -> None:
+def test_blinks_show_how_far_eyes_are_open() -> None:
     times = np.arange(1000) / 100
     noise = np.random.default_rng(4).normal(0, 0.3e-3, (1000, 2))
     half_way = lid(times, {1.0: 0.009, 3.0: 0.006, 5.0: 0.009, 8.0: 0.009})
@@ -187,7 +185,7 @@ def test_swapped_markers(one: str, other: str) -> None:
     check(face, take(), 20)
 
 
-def test_markers_that_take_each_others_names_for_a_while() -> None:
+def test_markers_that_exchange_names_for_a_while() -> None:
     positions = take().motion.positions.copy()
     a, b, c = (NAMES.index(name) for name in ("LPL1", "LPL2", "LCL"))
     positions[200:350, [a, b]] = positions[200:350, [b, a]]
@@ -290,7 +288,7 @@ def test_rigid_fit_beats_the_local_frame() -> None:
     assert off(rotation) < 0.6 * off(np.array(local))
 
 
-def test_names_that_tell_nothing() -> None:
+def test_names_that_say_nothing() -> None:
     order = np.random.default_rng(0).permutation(len(NAMES))
     names = tuple(f"unlabelled {n}" for n in range(len(NAMES)))
     positions = take().motion.positions[:, order] @ TURNED.T + (0.3, 0.2, 1.5)
@@ -360,7 +358,7 @@ def test_maps_are_changed_by_hand_and_saved(tmp_path: Path) -> None:
         ("[markers\n", "a.toml:1: is not TOML"),
     ],
 )
-def test_maps_that_are_none(tmp_path: Path, text: str, message: str) -> None:
+def test_wrong_maps_are_refused(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "a.toml").write_text(text)
     with pytest.raises(FormatError, match=message):
         read_map(tmp_path / "a.toml")
@@ -393,7 +391,7 @@ def test_captures_without_a_face() -> None:
         replace(motion, times=np.r_[0.0, 0.1, 0.2, 0.15, np.arange(4, 500)])
 
 
-def test_markers_that_are_none() -> None:
+def test_wrong_markers_are_refused() -> None:
     positions, times = np.zeros((2, 2, 3)), np.arange(2.0)
     for names, where, when, rate, message in (
         (("A",), positions, times, 1, r"1 names need positions \(T, 1, 3\) and times \(T,\)"),

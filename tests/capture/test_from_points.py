@@ -76,7 +76,7 @@ def test_68_points_in_metres() -> None:
     check(film(actor(), 68, metric=True), {3: 40, 14: 40}, 25, 0.4)
 
 
-def test_points_without_depth_tell_nothing_of_depth() -> None:
+def test_points_without_depth_send_no_faps_of_depth() -> None:
     take = film(actor(), 70, flat=True, frames=180)
     face = find_point_face(take.motion, neutral="first")
     assert not {14, 16, 17, 27, 28} & set(face.sent)
@@ -110,7 +110,7 @@ def test_the_aspect_of_the_picture_is_found() -> None:
         ((1, 1, -1), "depth counts towards the camera"),
     ],
 )
-def test_axes_that_count_the_other_way(turned: tuple[int, int, int], message: str) -> None:
+def test_reversed_axes_are_turned(turned: tuple[int, int, int], message: str) -> None:
     take = deep_take()
     motion = replace(take.motion, positions=take.motion.positions * turned, aspect=16 / 9)
     with pytest.warns(FbaWarning, match=message):
@@ -169,7 +169,7 @@ def brow_film(mood: str, share: float, *, lower: float = 0.0, frames: int = 120)
 @pytest.mark.parametrize("share", [0.6, 0.8])
 @pytest.mark.parametrize("lower", [-0.003, 0.0, 0.002])
 @pytest.mark.parametrize("mood", ["surprise", "anger"])
-def test_brows_that_are_held_for_most_of_a_film_are_no_rest(mood: str, lower: float, share: float) -> None:
+def test_brows_held_for_most_of_a_film_are_not_at_rest(mood: str, lower: float, share: float) -> None:
     """Before, what was held for more than half of a film was 0, and its rest the opposite mood."""
     take = brow_film(mood, share, lower=lower)
     with pytest.warns(FbaWarning, match=r"brows rest as at .* mm (higher|lower).*neutral=12"):
@@ -180,7 +180,7 @@ def test_brows_that_are_held_for_most_of_a_film_are_no_rest(mood: str, lower: fl
 
 
 @pytest.mark.parametrize(("mood", "way", "lower"), [("surprise", 1, 0.0), ("anger", -1, 0.002)])
-def test_brows_that_are_held_throughout_are_shown_in_part_and_said(mood: str, way: int, lower: float) -> None:
+def test_brows_held_throughout_are_shown_in_part_and_reported(mood: str, way: int, lower: float) -> None:
     """Hardly a face has brows that high or low: a sixth of the mood, and more, remains."""
     take = brow_film(mood, 1.0, lower=lower)
     with pytest.warns(FbaWarning, match=r"than they usually rest, even then.*neutral=12"):
@@ -193,7 +193,7 @@ def test_brows_that_are_held_throughout_are_shown_in_part_and_said(mood: str, wa
     assert abs(face.faps[:, [*INNER, *MIDDLE]].mean()) < 40
 
 
-def test_a_doubt_about_brows_is_said() -> None:
+def test_doubtful_brows_are_reported() -> None:
     """A face with low brows that raises them most of the time is as likely one that lowers them at times."""
     with pytest.warns(FbaWarning, match="or it is the other way round, which is hard to tell"):
         find_point_face(brow_film("surprise", 0.8, lower=0.0045).motion)

@@ -196,7 +196,7 @@ def test_names_in_another_case() -> None:
     assert found["l_elbow"] == motion().names.index("LeftForeArm")
 
 
-def test_own_names() -> None:
+def test_names_of_the_standard() -> None:
     captured = motion("T")
     renamed = SkeletonMotion(
         tuple(f"j{n}" for n in range(len(captured.names))), captured.parents, captured.offsets,
@@ -259,7 +259,7 @@ def test_bodies_that_cannot_be_placed() -> None:
     assert any("no joints for l_knee, l_ankle, r_knee, r_ankle;" in text for text in texts)
 
 
-def test_what_is_no_figure_is_said_to_be_none(shared: Path) -> None:
+def test_a_file_without_a_figure_is_refused(shared: Path) -> None:
     """A picture of a fox whose star alone moves."""
     with pytest.raises(FormatError, match=r"no human skeleton is found: there is but one joint \(Star.001\)"):
         fba.read(shared / "data/foreign/bodies/fox.glb")

@@ -270,7 +270,7 @@ def test_a_foot_that_slides_stands_where_the_other_one_is_lifted() -> None:
     np.testing.assert_allclose(settled(np.full(60, 0.01), 0.02, slide=1.2)[0], 0.01, atol=1e-12)  # a leap
 
 
-def test_nobody_stands_on_a_step_that_is_no_ground() -> None:
+def test_nobody_stands_on_a_step_above_the_ground() -> None:
     np.testing.assert_allclose(settled(np.full(60, 0.079), 0.3), [[0.0] * 60, [0.3 - 0.079] * 60], atol=1e-12)
     np.testing.assert_allclose(settled(np.full(60, 0.081), 0.3)[0], 0.081, atol=1e-12)
 

@@ -38,7 +38,7 @@ def test_names_say_side_and_part(name: str, side: str, part: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["upperarm_twist_01_l", "LeftHandEnd", "ik_hand_gun", "eye.l"])
-def test_helpers_are_no_bones(name: str) -> None:
+def test_names_of_helpers_name_no_bones(name: str) -> None:
     assert read(name).helper
 
 
@@ -167,7 +167,7 @@ def test_the_middle_of_a_finger_is_no_middle_finger() -> None:
             parents.append(0 if not number else len(names) - 1)
             names.append(f"L_{finger}_{part}_jnt")
     meanings = [read(name) for name in names]
-    found = _fingers("l", {"l_wrist": 0}, names, meanings, np.array(parents))
+    found = _fingers("l", range(len(names)), names, meanings, np.array(parents))
     assert {names[number] for joint, number in found.items() if "ring" in joint} == {
         "L_ring_base_jnt", "L_ring_mid_jnt",
     }  # fmt: skip

@@ -25,7 +25,7 @@ TRUNKS = {"walks": 1.0, "lies": 0.0, "lies_on_a_side": 0.0, "rolls": 0.0, "crawl
 
 @pytest.mark.parametrize("up", UPS)
 @pytest.mark.parametrize("posture", POSTURES)
-def test_a_file_in_axes_of_its_own_is_believed(posture: str, up: str) -> None:
+def test_a_file_with_other_axes_is_trusted(posture: str, up: str) -> None:
     """Its rest pose stands along them. Somebody who stands, crawls or turns leaves no doubt."""
     made = turned(POSTURES[posture](), UPS[up])
     with warnings.catch_warnings(record=True) as caught:
@@ -49,7 +49,7 @@ def test_people_are_shown_as_they_lie(posture: str) -> None:
 
 
 @pytest.mark.parametrize("posture", POSTURES)
-def test_what_the_format_says_is_believed_without_a_word(posture: str) -> None:
+def test_the_axis_of_the_format_needs_no_warning(posture: str) -> None:
     """As in glTF, where up is +y."""
     for up, world in UPS.items():
         made = replace(turned(POSTURES[posture](), world), up=up)
@@ -61,7 +61,7 @@ def test_what_the_format_says_is_believed_without_a_word(posture: str) -> None:
 
 
 @pytest.mark.parametrize("up", [up for up in UPS if up != "+y"])
-def test_a_floor_overrules_the_rest_pose_with_a_word(up: str) -> None:
+def test_a_floor_overrules_the_rest_pose_with_a_warning(up: str) -> None:
     """The rest pose stands along y, but the root turns whoever walks upright along another axis."""
     made = turned_by_the_root(POSTURES["walks"](), UPS[up])
     with pytest.warns(FbaWarning, match=rf"up is taken to be \{up}: people stand along it.*up='\+y'"):
@@ -87,7 +87,7 @@ def test_a_rest_pose_that_may_be_wrong_is_doubted(posture: str, up: str) -> None
         ("walks_on_hands", "+z", True), ("falls", "+y", True), ("lies_on_a_side", "+y", True),
     ],
 )  # fmt: skip
-def test_without_a_rest_pose_the_floor_tells(posture: str, up: str, said: bool) -> None:
+def test_without_a_rest_pose_the_floor_decides(posture: str, up: str, said: bool) -> None:
     """All bones lie along x at rest."""
     made = along_x(turned(POSTURES[posture](), UPS[up]))
     with warnings.catch_warnings(record=True) as caught:

@@ -86,7 +86,7 @@ def opening(vertices: np.ndarray) -> float:
     return float(vertices[bound(UPPER), 1] - vertices[bound(LOWER), 1])
 
 
-def test_lids_that_squint_narrow_from_both_sides_and_still_shut() -> None:
+def test_squinting_lids_narrow_from_both_sides_and_still_shut() -> None:
     plain, narrowed = performed(), performed(squint=0.6)
     assert opening(narrowed.rest) == pytest.approx(0.4 * opening(plain.rest), rel=0.1)
     moved = narrowed.rest - plain.rest
@@ -123,7 +123,7 @@ def test_eyes_turn_only_so_far() -> None:
         assert np.degrees(np.arccos(look[2])) < 50
 
 
-def test_eyes_of_a_performance_keep_looking_where_they_did() -> None:
+def test_eyes_of_a_performance_keep_looking_at_the_camera() -> None:
     fixed, looking = performed(), performed(gaze="camera")
     start = FaceModel.default().starts["eye_left"]
     eye = FaceModel.default().part("eye_left").vertices
@@ -145,7 +145,7 @@ def test_eyes_of_a_performance_keep_looking_where_they_did() -> None:
     np.testing.assert_allclose(between, looking.vertices(frame))
 
 
-def test_what_turns_is_written(tmp_path: Path) -> None:
+def test_turning_eyes_are_written(tmp_path: Path) -> None:
     write_moved_head(tmp_path / "looking.glb", performed(gaze="camera"))
     content = read_gltf(tmp_path / "looking.glb")
     channels = content.animations[0].channels
@@ -163,7 +163,7 @@ def test_a_mapping_keeps_lids_gaze_and_squint(tmp_path: Path) -> None:
     assert not {"lid", "gaze", "squint"} & set((tmp_path / "plain.toml").read_text().split())
 
 
-def test_what_cannot_be_is_named(tmp_path: Path) -> None:
+def test_impossible_lids_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="is on no lid's margin that is known"):
         find_rows(head(), bound("2.1"), 0.006)
     with pytest.raises(OptionError, match="a lid's marker needs a vertex, and cannot be fixed"):

@@ -56,6 +56,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
         (LEAST + '"Lip" = { vertex = 12, radius = 1 }\n', "'Chin' and 'Lip' are both at vertex 12"),
         ("[settings]\nscale = 'FHL'\n" + LEAST, "scale must be a list of two markers"),
         ("[settings]\nscale = ['Chin', 'Lip']\n" + LEAST, "scale: 'Chin' is no fixed marker"),
+        (f"[settings]\nsquint = 1{400 * '0'}\n" + LEAST, "too large"),
         ("[settings]\noverlap = 3\n" + LEAST, "overlap must be a word, not 3"),
         ("[settings]\nassignment = 'both'\n" + LEAST, "assignment must be one of shared, exclusive"),
         ("[settings]\nasignment = 'shared'\n" + LEAST, "settings: there is no 'asignment'"),

@@ -89,7 +89,7 @@ def test_lips_that_touch_are_not_joined() -> None:
     assert near[len(upper) :].any()  # which a search by distance alone would take
 
 
-def test_what_is_no_centre_or_no_size_is_refused() -> None:
+def test_wrong_centres_and_sizes_are_refused() -> None:
     places, triangles = grid(2, 2)
     with pytest.raises(ModelError, match="no vertex 9: the mesh has 9, counted from 0"):
         find_influence(places, triangles, 9, 1.0)
@@ -227,7 +227,7 @@ def test_gaps_are_filled() -> None:
     assert np.isnan(shown.cloud[20, 4]).all()
 
 
-def test_what_a_fixed_marker_does_by_itself_is_noise() -> None:
+def test_motion_of_a_single_fixed_marker_is_noise() -> None:
     positions = capture().positions.copy()
     positions[20:, 1, 2] += 0.002
     shown = move_head(replace(capture(), positions=positions), sheet(), mapping())
@@ -294,7 +294,7 @@ def test_fixed_markers_at_one_place_give_no_scale() -> None:
         move_head(capture(), sheet(), replace(doubtful, scale=("A", "D")))
 
 
-def test_a_mesh_that_changed_is_found() -> None:
+def test_a_changed_mesh_is_recognised() -> None:
     made = mapping().for_head(sheet())
     move_head(capture(), sheet(), made)
     with pytest.raises(ModelError, match="441 vertices and 800 triangles there, 462 and 840 here"):

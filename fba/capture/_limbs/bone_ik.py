@@ -10,11 +10,11 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 
-STEPS = 8
-"""Most iterations."""
-LEAP = 0.5
+MAX_ITERATIONS = 8
+"""Largest number of iterations."""
+MAX_STEP = 0.5
 """Largest change of an angle in one iteration, in radians, so that almost straight limbs do not flip."""
-SETTLED = 1e-7
+MAX_CHANGE = 1e-7
 """Change in radians below which the iteration ends."""
 
 
@@ -55,7 +55,7 @@ def aim_all(axes: Float64, start: Float64, targets: Sequence[Target], weights: F
     angles = np.array(start)
     count = axes.shape[0]
     square = weights * weights
-    for _ in range(STEPS):
+    for _ in range(MAX_ITERATIONS):
         frames = [np.broadcast_to(np.eye(3), (len(angles), 3, 3))]
         for number, axis in enumerate(axes):
             frames.append(frames[-1] @ rotations.turn(axis, angles[:, number]))
@@ -79,8 +79,8 @@ def aim_all(axes: Float64, start: Float64, targets: Sequence[Target], weights: F
             pull += np.einsum("tik,ti->tk", slopes, target.wanted - line)
         step = np.linalg.solve(normal, pull[:, :, None])[:, :, 0]
         largest = np.abs(step).max(axis=1, keepdims=True)
-        step *= np.minimum(1.0, LEAP / np.maximum(largest, 1e-12))
+        step *= np.minimum(1.0, MAX_STEP / np.maximum(largest, 1e-12))
         angles += step
-        if np.abs(step).max(initial=0.0) < SETTLED:
+        if np.abs(step).max(initial=0.0) < MAX_CHANGE:
             break
     return angles

@@ -4,9 +4,9 @@ Legs move as little as possible: the knee bends or stretches until hip and ankle
 the leg swings about the hip. A leg that is almost straight must bend a lot to change its length: the
 straighter it is, the less it changes its length, and the rest of the error remains.
 
-Toes bend like the source's, and up where the ground is in their way. A joint of toes has one axis, and many
-sources have none. Someone who rises over the ball of a foot leaves the toes on the ground; stiff toes would
-stick centimetres into it.
+Toes bend like the source's, and up where the ground is in their way: when the heel rises, toes stay on the
+ground, while stiff toes would stick centimetres into it. A joint of toes has a single axis, and many sources
+have no such joint.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ def turn_foot(targets: Targets, side: str) -> None:
 def _split_foot(targets: Targets, ankle: str, subtalar: str, foot: Float64) -> None:
     """Set both joints so that together they turn the foot: flexion, twist and roll reach any rotation."""
     above = targets.parent_rotation(ankle)
-    own = targets.axes(ankle)[0]
-    axes = np.concatenate([own, targets.axes(subtalar)[0]])
+    ankle_axes = targets.axes(ankle)[0]
+    axes = np.concatenate([ankle_axes, targets.axes(subtalar)[0]])
     targets.rotations[subtalar] = foot
     handedness = np.linalg.det(axes) if len(axes) == 3 else 0.0
     if abs(handedness) < 0.5:
@@ -72,14 +72,14 @@ def _split_foot(targets: Targets, ankle: str, subtalar: str, foot: Float64) -> N
     last = rotations.inside(above, foot @ axes[2]) @ axes.T  # the last axis, as the foot turns it
     outer = np.arctan2(-handedness * last[:, 1], last[:, 2])
     inner = np.arctan2(handedness * last[:, 0], np.hypot(last[:, 1], last[:, 2]))
-    targets.rotations[ankle] = above @ bone_ik.product(own, np.stack([outer, inner], axis=1))
+    targets.rotations[ankle] = above @ bone_ik.product(ankle_axes, np.stack([outer, inner], axis=1))
 
 
 def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant: bool) -> Float64:
     """Return positions of the root (T, 3), in metres, at which the feet stand as the source's do.
 
-    root: positions to start from. scale: metres for one unit of the source. floor: "floor" for a ground at
-    height 0, else it is that of the source. plant: also move the legs, which changes the targets.
+    root: the positions before. scale: metres for a unit of the source. floor: "floor" for a ground at height
+    0, else for that of the source. plant: move the legs, too, which changes the targets.
     """
     root = root.copy()
     rate = float(targets.motion.rate)
@@ -165,8 +165,7 @@ class Leg:
 def length_share(leg: Leg) -> Float64:
     """Return the shares (T,) of a wanted change of length that a leg makes: 0 if straight, near 1 if bent."""
     slope = _leg_lengths(leg)[1]
-    result: Float64 = slope * slope / (slope * slope + MIN_KNEE_SLOPE * MIN_KNEE_SLOPE)
-    return result
+    return slope * slope / (slope * slope + MIN_KNEE_SLOPE * MIN_KNEE_SLOPE)
 
 
 def move_ankle(leg: Leg, move: Float64) -> tuple[Float64, Float64]:
@@ -196,7 +195,7 @@ def _leg_lengths(leg: Leg) -> tuple[Float64, Float64]:
 
 
 def _source_bend(targets: Targets, side: str) -> Float64:
-    """Return the bend (T,) of the source's toes in radians, upwards; 0 where it has none."""
+    """Return the bend (T,) of the source's toes in radians, upwards; 0 for a source without toes."""
     joint = f"{side}_metatarsal"
     if joint not in targets.rotations:
         return np.zeros(len(targets.motion))

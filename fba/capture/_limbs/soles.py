@@ -1,9 +1,9 @@
-"""Find the soles of source and body, and how far feet must move so that they stand like the source's.
+"""Find the soles of source and body, and how far feet must move to stand like the source's.
 
 Bones point in the directions of the source's, but thigh, shank and foot have other proportions. So soles end
-up millimetres to centimetres higher or lower than the source's, and slip a little where the source's stand
-still; and the ground of each source is at another height. First the body is raised or lowered as a whole,
-frame by frame, so that the foot on the ground is as high above it as the source's; legs correct the rest
+up millimetres to centimetres higher or lower than the source's, and slip a little while the source's stand
+still; the height of the ground differs, too. First the whole body is raised or lowered in each frame, so that
+the foot on the ground is as high above it as the source's; legs correct the rest
 (`fba.capture._limbs.foot_planting.move_ankle`).
 """
 
@@ -31,10 +31,10 @@ ANKLE_HEIGHT = 0.076
 BALL_DISTANCE = 0.15
 """Distance from the default skeleton's ankle ahead to the ball of the foot, in metres."""
 ON_GROUND = 0.015
-"""Height in metres at which the influence of a foot on the height of the body falls to 1/e."""
-SETTLED = 0.02
+"""Height of a foot, in metres, at which its influence on the height of the body falls to 1/e."""
+USUAL_WEIGHT = 0.02
 """Weight of the usual height, which counts while no foot is on the ground."""
-SMOOTHING = 0.02
+SMOOTHING_SECONDS = 0.02
 """Seconds over which corrections are averaged."""
 MAX_FULL_CORRECTION = 0.012
 """Height above the ground, in metres, below which a leg moves its foot by the whole error."""
@@ -60,12 +60,12 @@ MAX_AIR_RISE = 0.015
 """Largest distance, in metres, by which a leg lifts a foot in the air that would be under the ground. The
 body as a whole rises by the rest."""
 MAX_UNSEEN_DEPTH = 0.002
-"""Largest depth under the ground, in metres, that nobody sees."""
+"""Largest invisible depth under the ground, in metres."""
 AIR_WEIGHT = 0.002
-"""Weight of a foot in the air moving as it did, relative to one on the ground not slipping."""
+"""Weight of keeping the motion of a foot in the air, relative to that of no slip on the ground."""
 RETURN_WEIGHT = 0.3
-"""Weight, per second squared, of the position without correction: a foot in the air comes back to it within
-a sixth of a second, one on the ground drifts back over seconds."""
+"""Weight, per second squared, of the position without correction: a foot in the air returns to it within a
+sixth of a second, a foot on the ground over seconds."""
 BODY_RETURN_WEIGHT = 1.0
 """Weight, per second squared, of the uncorrected position of the body as a whole."""
 
@@ -99,10 +99,7 @@ def source_soles(
     lows, points, balls = [], [], []
     for side in "lr":
         ankle = mapped[f"{side}_ankle"]
-        foot = [ankle]
-        for joint, parent in enumerate(motion.parents):
-            if int(parent) in foot:
-                foot.append(joint)
+        foot = motion.descendants(ankle)
         at_rest = [rest[joint] - rest[ankle] for joint in foot]
         moving = [positions[:, joint] for joint in foot]
         for parent, offset in zip(motion.end_parents, motion.end_offsets, strict=True):
@@ -114,7 +111,7 @@ def source_soles(
         ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
         along = [float(point @ ahead) * metres for point in at_rest]
         depth = min(float(point[1]) for point in at_rest)
-        if max(along) < MIN_FOOT_LENGTH:  # a foot that ends at the ankle: the front is where the body's is
+        if max(along) < MIN_FOOT_LENGTH:  # the foot ends at the ankle: its front is that of the body
             depth = min(depth, -ANKLE_HEIGHT / metres)
             turn = rotations.matrices(turned[:, ankle])
             left = rest[mapped["l_ankle"]] - rest[mapped["r_ankle"]]
@@ -150,7 +147,7 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
     """
     lows, points, balls = [], [], []
     shown = BodyModel.default().skeleton if skeleton is Skeleton.default() else skeleton
-    seen = []
+    shown_lows = []
     for side in SIDES:
         last = f"{side}_metatarsal"
         if last not in skeleton:
@@ -161,12 +158,12 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
             return None
         points.append(ends)
         lows.append(lowest_edge(skeleton, frames, side, SOLE))
-        balls.append(points[-1][1][:, 1] - lows[-1])
+        balls.append(ends[1][:, 1] - lows[-1])
         if shown is not skeleton:
-            seen.append(lowest_edge(shown, joint_frames(shown, wanted, root, last), side, SOLE))
+            shown_lows.append(lowest_edge(shown, joint_frames(shown, wanted, root, last), side, SOLE))
     lowest = np.array(lows)
-    if seen:
-        lowest = np.array(seen) + lowest.min(axis=0) - np.min(seen, axis=0)
+    if shown_lows:
+        lowest = np.array(shown_lows) + lowest.min(axis=0) - np.min(shown_lows, axis=0)
     return Soles(lowest, np.array(points), np.array(balls))
 
 
@@ -202,41 +199,39 @@ def lift(above: Float64, body: Float64, stiff: Float64, rate: float) -> Float64:
     usual = float(np.median(lacking[contact > 0.5])) if (contact > 0.5).any() else float(np.median(lacking))
     weight = contact * stiff
     correction = (weight * (lacking - usual)).sum(axis=0)
-    result = usual + correction / (weight.sum(axis=0) + SETTLED * stiff.mean(axis=0))
+    result = usual + correction / (weight.sum(axis=0) + USUAL_WEIGHT * stiff.mean(axis=0))
     return smooth(result, rate)
 
 
 def settle(above: Float64, points: Float64, rate: float) -> Float64:
-    """Return heights (2, T) of soles above the ground without what captures leave of it in feet that stand.
+    """Return heights (2, T) of soles, 0 where they stand: errors of the capture there are removed.
 
-    above: (2, T), metres. points: (2, 2, T, 3), of the soles. The ground of a foot goes from its height
-    where it stands (`fba.body.stance.find_standing`) to that where it stands next. Nobody is under the
-    ground.
+    above: (2, T), metres above the ground. points: (2, 2, T, 3), of the soles. The ground of a foot goes from
+    its height where it stands (`fba.body.stance.find_standing`) to its height where it stands next. No result
+    is under the ground.
     """
     if above.shape[1] > 1:
         lowest = above.min(axis=0)
         stands = find_standing(above, points, rate)
         support = _levels(lowest, (stands & (above <= lowest)).any(axis=0), rate)
-        own = [
+        grounds = [
             _levels(foot, on, rate) if on.any() else support for foot, on in zip(above, stands, strict=True)
         ]
-        above = above - np.array(own)
-    result: Float64 = np.maximum(above, 0.0)
-    return result
+        above = above - np.array(grounds)
+    return np.maximum(above, 0.0)
 
 
 def _levels(height: Float64, stands: Bool, rate: float) -> Float64:
-    """Return the height (T,) of the ground under a foot at heights (T,): its own where it stands."""
+    """Return the height (T,) of the ground under a foot at heights (T,): that of the foot where it stands."""
     if not stands.any():
         return np.zeros_like(height)
     frames = np.arange(len(height))
-    return smooth(np.interp(frames, frames[stands], height[stands]), rate * LEVEL_SECONDS / SMOOTHING)
+    return smooth(np.interp(frames, frames[stands], height[stands]), rate * LEVEL_SECONDS / SMOOTHING_SECONDS)
 
 
 def grounded(above: Float64) -> Float64:
     """Return the contact of feet with the ground at these heights: 1 on the ground, less above."""
-    contact: Float64 = np.exp(-((np.maximum(above, 0.0) / ON_GROUND) ** 2))
-    return contact
+    return np.exp(-((np.maximum(above, 0.0) / ON_GROUND) ** 2))
 
 
 def heights(above: Float64, body: Float64, rate: float, done: Float64 | float = 0.0) -> Float64:
@@ -251,14 +246,13 @@ def heights(above: Float64, body: Float64, rate: float, done: Float64 | float = 
     dips = np.array([rise_above(foot, rate) for foot in -body])
     moves = np.clip(done + moves, -MAX_MOVE, MAX_RISE) - done
     dips = np.minimum(done + dips, np.maximum(done, MAX_AIR_RISE)) - done
-    result: Float64 = moves + np.maximum(dips - np.maximum(moves, 0.0), 0.0)
-    return result
+    return moves + np.maximum(dips - np.maximum(moves, 0.0), 0.0)
 
 
 def rise_above(depth: Float64, rate: float) -> Float64:
-    """Return metres (T,) to raise what is at a depth (T,) under the ground, so that it hardly is.
+    """Return metres (T,), 0 or more, to raise points at depths (T,) under the ground, until no depth is seen.
 
-    0 or more, whatever is above the ground; a little before and after, so that it does not start abruptly.
+    They rise a little before and after, too, so that the motion does not start abruptly.
     """
     needed = np.maximum(depth - MAX_UNSEEN_DEPTH, 0.0)
     return np.maximum(needed, smooth(needed, rate))
@@ -281,28 +275,27 @@ def pitches(body: Float64, ups: Float64, above: Float64) -> Float64:
 
 def tiptoe(body: Float64) -> Float64:
     """Return (2, T): 0 for feet on their heels, 1 on their balls. body: (2, 2, T, 3), points of the soles."""
-    result: Float64 = 0.5 - 0.5 * np.tanh((body[:, 1, :, 1] - body[:, 0, :, 1]) / MIN_TIPTOE_HEIGHT)
-    return result
+    return 0.5 - 0.5 * np.tanh((body[:, 1, :, 1] - body[:, 0, :, 1]) / MIN_TIPTOE_HEIGHT)
 
 
 def slips(source: Float64, body: Float64, level: Float64, rate: float) -> tuple[Float64, Float64]:
-    """Return corrections in metres along x and z, so that feet on the ground move as the source's do.
+    """Return corrections in metres along x and z, with which feet on the ground move as the source's.
 
-    (T, 2) for the body, and (2, T, 2) for each foot after that. source, body: (2, 2, T, 3), points of the
-    soles. level: (2, T), height of the ground under the source's. Where a point is on the ground, its
-    velocity becomes the source's; otherwise corrections are as small as possible. The body moves as far as
-    that helps, because that turns no bone.
+    They are (T, 2) for the body, and (2, T, 2) for each foot after that. source, body: (2, 2, T, 3), points
+    of the soles. level: (2, T), height of the ground under the source's. The velocity of a point on the
+    ground becomes the source's; all other corrections are as small as possible. The body moves as far as that
+    helps, because that turns no bone.
     """
     contact = grounded(source[..., 1] - level[:, None])
     contact = np.minimum(contact[..., 1:], contact[..., :-1])
     drift = -(contact[..., None] * np.diff(body - source, axis=2)[..., [0, 2]]).sum(axis=1)
     firm = contact.sum(axis=1)
-    common = _course(drift.sum(axis=0), firm.sum(axis=0), BODY_RETURN_WEIGHT, rate)
+    common = _path(drift.sum(axis=0), firm.sum(axis=0), BODY_RETURN_WEIGHT, rate)
     remaining = drift - firm[..., None] * np.diff(common, axis=0)
-    return common, np.array([_course(remaining[foot], firm[foot], RETURN_WEIGHT, rate) for foot in range(2)])
+    return common, np.array([_path(remaining[foot], firm[foot], RETURN_WEIGHT, rate) for foot in range(2)])
 
 
-def _course(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
+def _path(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
     """Return a correction over time (T, 2), whose changes come close to given ones.
 
     aim: (T - 1, 2), changes from frame to frame times their weights. firm: (T - 1,), the weights. back:
@@ -316,15 +309,15 @@ def _course(aim: Float64, firm: Float64, back: float, rate: float) -> Float64:
         pull[1:] += aim[:, axis] * rate
         pull[:-1] -= aim[:, axis] * rate
         chain(np.full(count, back / rate), bonds, pull, result[axis])
-    course = result.T
-    length = np.linalg.norm(course, axis=1, keepdims=True)
-    bounded: Float64 = course * (MAX_MOVE * np.tanh(length / MAX_MOVE) / np.maximum(length, 1e-12))
+    path = result.T
+    length = np.linalg.norm(path, axis=1, keepdims=True)
+    bounded: Float64 = path * (MAX_MOVE * np.tanh(length / MAX_MOVE) / np.maximum(length, 1e-12))
     return bounded
 
 
 def smooth(values: Float64, rate: float) -> Float64:
     """Return values (T,) smoothed by a moving average, applied twice."""
-    half = max(1, round(SMOOTHING * rate))
+    half = max(1, round(SMOOTHING_SECONDS * rate))
     for _ in range(2):
         sums = np.concatenate([[0.0], np.cumsum(np.pad(values, half, mode="edge"))])
         values = (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)

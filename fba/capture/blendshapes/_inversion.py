@@ -11,7 +11,7 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture.blendshapes._motion import ShapeMotion
 from fba.capture.blendshapes.combination import CLOSED, JAW, RADIAN
-from fba.capture.blendshapes.conversion import EYES, HEAD
+from fba.capture.blendshapes.conversion import EYE_FAPS, HEAD_FAPS
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
 from fba.compiled import compiled
 from fba.errors import ModelError
@@ -32,7 +32,7 @@ alike, as real faces do, and keeps shapes out of movements too small to see."""
 def to_blendshapes(animation: Animation, names: tuple[str, ...] = ARKIT_ORDER) -> ShapeMotion:
     """Return weights of ARKit's 52 shapes, 0 to 1, that show a face like its FAPs, and head and eyes.
 
-    names: of other shapes with known FAPs instead, such as "aa" and "happy" of VRM.
+    names: of other shapes with known FAPs, such as "aa" and "happy" of VRM.
 
     Visemes and expressions become FAPs first (`fba.face.resolve`). The weights of each frame are those whose
     FAPs come closest, by least squares of how far an adult's face moves. What no shape moves (ears, pupils,
@@ -43,21 +43,18 @@ def to_blendshapes(animation: Animation, names: tuple[str, ...] = ARKIT_ORDER) -
     if animation.face is None or not len(animation):
         raise ModelError("the animation has no face; there is nothing to make blendshapes of")
     shown = resolve(animation.face).astype(np.float64)
-    weights = _solve(_shapes(names), shown * _metres(names))
+    shapes = _shapes(names)
+    products = shapes @ shapes.T + SHARED_WEIGHT**2 * np.eye(len(shapes))
+    weights = find_weights(products, (shown * _metres(names)) @ shapes.T, MAX_SWEEPS, MAX_CHANGE)
     if {JAW, CLOSED} <= set(names):
         opened, closed = names.index(JAW), names.index(CLOSED)
         weights[:, opened] = np.minimum(weights[:, opened] + weights[:, closed], 1.0)
     times = np.asarray(animation.index, dtype=np.float64) / float(animation.rate)
     return ShapeMotion(
         names, weights, times - times[0], Fraction(animation.rate),
-        head=_angles(shown, HEAD), eyes=_angles(shown, EYES), start=float(times[0]), name=animation.name,
+        head=_angles(shown, HEAD_FAPS), eyes=_angles(shown, EYE_FAPS), start=float(times[0]),
+        name=animation.name,
     )  # fmt: skip
-
-
-def _solve(shapes: Float64, wanted: Float64) -> Float64:
-    """Return weights (T, N), 0 to 1, of shapes (N, 68) that add up to what is wanted (T, 68), in metres."""
-    products = shapes @ shapes.T + SHARED_WEIGHT**2 * np.eye(len(shapes))
-    return find_weights(products, wanted @ shapes.T, MAX_SWEEPS, MAX_CHANGE)
 
 
 @cache
@@ -80,7 +77,7 @@ def _metres(names: tuple[str, ...]) -> Float64:
     """Return how far one step of each FAP moves an adult's face, metres (68,); 0 for what no shape moves."""
     fapu = Fapu.measure(neutral_points())
     metres = np.array([fapu[fap.unit] if fap.unit and fap.unit != "AU" else 0.0 for fap in faps()])
-    for name in EYES:
+    for name in EYE_FAPS:
         metres[fap_numbers()[name] - 1] = EYEBALL_RADIUS / RADIAN
     moved = np.zeros(FAP_COUNT, dtype=bool)
     for name in names:
@@ -98,9 +95,9 @@ def _angles(shown: Float64, names: tuple[str, ...]) -> Float64:
 def find_weights(products: Float64, goals: Float64, sweeps: int, settled: float) -> Float64:
     """Turn goals (T, N) into weights (T, N) of 0 to 1 that solve least squares; return them.
 
-    products: (N, N), of all shapes with each other, goals: of what is wanted with each shape. Each weight in
-    turn is set to its best value for the others, up to `sweeps` times, until none changes by more than
-    `settled`. A frame starts from the weights of the one before it. The loop is compiled, see `fba.compiled`.
+    products: (N, N), of all shapes with each other. goals: products of what is wanted with each shape. Each
+    weight in turn is set to its best value for the others, up to `sweeps` times, until none changes by more
+    than `settled`. A frame starts from the weights of the frame before.
 
     Bounds: indices run over the shape of goals, the array that is written; products is checked against it.
     """

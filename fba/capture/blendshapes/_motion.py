@@ -1,14 +1,18 @@
-"""`ShapeMotion`: weights of blendshapes over time, from a capture of any format."""
+"""`ShapeMotion` and `ActionUnitMotion`: a captured face in rows at times, from a tracker of any kind."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from fba.arrays import Bool, Float64
-from fba.capture.blendshapes._rows import describe_rows, find_seen, freeze_rows
+from fba.capture.sampling import find_gaps
 from fba.errors import ModelError
+from fba.tracks import freeze
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +42,7 @@ class ShapeMotion:
     findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        freeze_rows(self, {"weights": len(self.names)})
+        _freeze(self, "weights", len(self.names))
         if len(set(self.names)) != len(self.names):
             raise ModelError("ShapeMotion: a name occurs twice")
 
@@ -48,8 +52,104 @@ class ShapeMotion:
     @property
     def seen(self) -> Bool:
         """Rows (T,) in which a face was seen: all numbers are there."""
-        return find_seen(self, self.weights)
+        return _find_seen(self, self.weights)
 
     def describe(self) -> dict[str, Any]:
         """Return what is in the capture, for `fba info`: plain numbers, texts and lists of them."""
-        return describe_rows(self, "blendshapes", self.names, self.weights)
+        return _describe(self, "blendshapes", self.names, self.weights)
+
+
+@dataclass(frozen=True, eq=False)
+class ActionUnitMotion:
+    """A captured face: intensities of action units (FACS), turns of head and eyes, at the source's times.
+
+    units: N numbers of action units. intensities: float64 (T, N), 0 to 1, the strongest; NaN in rows without
+    a face. times, rate, head, eyes, name, findings: as in `fba.capture.ShapeMotion`. Immutable.
+
+    Raises ModelError if the parts contradict each other.
+    """
+
+    units: tuple[int, ...]
+    intensities: Float64
+    times: Float64
+    rate: Fraction
+    head: Float64 | None = None
+    eyes: Float64 | None = None
+    name: str = ""
+    findings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        _freeze(self, "intensities", len(self.units))
+        if len(set(self.units)) != len(self.units):
+            raise ModelError("ActionUnitMotion: a unit occurs twice")
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def start(self) -> None:
+        """No tracker of action units says at what time of day a film was made."""
+        return None
+
+    def describe(self) -> dict[str, Any]:
+        """Return what is in the capture, for `fba info`: plain numbers, texts and lists of them."""
+        return _describe(self, "action units", [f"AU{unit:02}" for unit in self.units], self.intensities)
+
+
+def _freeze(motion: ShapeMotion | ActionUnitMotion, amounts: str, count: int) -> None:
+    """Make the arrays float64 and read-only, and the rate a fraction.
+
+    amounts: name of the array (T, count) of what was recorded. Raises ModelError if arrays have other shapes
+    or are infinite, times do not increase, or the rate is not positive.
+    """
+    kind, rows = type(motion).__name__, len(motion.times)
+    shapes = {amounts: (rows, count), "times": (rows,), "head": (rows, 3), "eyes": (rows, 4)}
+    for name, shape in shapes.items():
+        value = getattr(motion, name)
+        if value is None:
+            continue
+        array = np.array(value, dtype=np.float64)
+        if array.shape != shape:
+            raise ModelError(f"{kind}: {name} has shape {array.shape}, not {shape}")
+        if np.isinf(array).any():
+            raise ModelError(f"{kind}: {name} must be finite, or NaN where no face was seen")
+        freeze(motion, **{name: array})
+    freeze(motion, rate=Fraction(motion.rate))
+    if motion.rate <= 0:
+        raise ModelError(f"{kind}: the rate must be positive, not {motion.rate}")
+    if rows and not (np.isfinite(motion.times).all() and (np.diff(motion.times) > 0).all()):
+        raise ModelError(f"{kind}: times must be finite, and each later than the one before")
+
+
+def _find_seen(motion: ShapeMotion | ActionUnitMotion, amounts: Float64) -> Bool:
+    """Return the rows (T,) in which a face was seen: no number is missing. amounts: (T, n)."""
+    numbers = [array for array in (amounts, motion.head, motion.eyes) if array is not None]
+    seen: Bool = np.isnan(np.concatenate(numbers, axis=1)).sum(axis=1) == 0
+    return seen
+
+
+def _describe(
+    motion: ShapeMotion | ActionUnitMotion, kind: str, names: Sequence[str], amounts: Float64
+) -> dict[str, Any]:
+    """Return what `describe` does. names: N, of what amounts (T, N) are of."""
+    seen = _find_seen(motion, amounts)
+    gaps = find_gaps(motion.times[seen], motion.rate)
+    still = [
+        name for name, column in zip(names, amounts[seen].T, strict=True) if not (column != column[:1]).any()
+    ]
+    return {
+        "kind": kind,
+        "rows": len(motion),
+        "unseen": int((~seen).sum()),
+        "seconds": round(float(motion.times[-1] - motion.times[0]), 6) if len(motion) else 0.0,
+        "rate": str(motion.rate),
+        "start": motion.start,
+        "shapes": list(names),
+        "still": still,
+        "angles": {
+            what: angles is not None and bool(np.nanmax(np.abs(angles), initial=0.0) > 0)
+            for what, angles in (("head", motion.head), ("eyes", motion.eyes))
+        },
+        "gaps": [[round(start, 3), round(length, 3)] for start, length in gaps],
+        "findings": list(motion.findings),
+    }

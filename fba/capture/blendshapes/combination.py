@@ -28,11 +28,10 @@ MAX_FAP = 1 << 30
 
 
 def combine(weights: Mapping[str, Float64], count: int, *, but: Bool | None = None) -> tuple[Float64, Bool]:
-    """Return FAPs (T, 68) of shapes with weights (T,), and which of them (68,) the shapes move at all.
+    """Return FAPs (T, 68) of shapes with weights (T,), and a mask (68,) of those that the shapes move.
 
-    count: T. Names that mean nothing here are left out. but: FAPs (68,) that something else moves.
-    "mouthClose" brings the lips of an open jaw together: it counts up to the weight of "jawOpen", and not at
-    all without it.
+    count: T. Unknown names are left out. but: mask (68,) of FAPs that something else moves. "mouthClose"
+    brings the lips of an open jaw together: it counts up to the weight of "jawOpen", and not without it.
     """
     known = {name: amounts for name in weights if (amounts := amounts_of(name)) is not None}
     if not known:
@@ -61,7 +60,7 @@ def part_lids(values: Float64) -> None:
 def to_face_track(values: Float64, moved: Bool) -> FaceTrack:
     """Return FAPs (T, 68) as a track: lids kept apart, the gaze limited, values rounded.
 
-    values: changed in place. moved: (68,), the FAPs that are sent, with their mates.
+    values: changed in place. moved: mask (68,) of the FAPs that are sent, together with their mates.
     """
     part_lids(values)
     limit_gaze(values)

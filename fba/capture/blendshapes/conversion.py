@@ -19,8 +19,8 @@ from fba.tracks import FaceTrack
 
 FRAME_BYTES = 1500
 """Memory, in bytes, that a frame takes: its FAPs in several number types."""
-HEAD = ("head_pitch", "head_yaw", "head_roll")
-EYES = ("yaw_l_eyeball", "yaw_r_eyeball", "pitch_l_eyeball", "pitch_r_eyeball")
+HEAD_FAPS = ("head_pitch", "head_yaw", "head_roll")
+EYE_FAPS = ("yaw_l_eyeball", "yaw_r_eyeball", "pitch_l_eyeball", "pitch_r_eyeball")
 
 
 def from_blendshapes(
@@ -28,10 +28,10 @@ def from_blendshapes(
 ) -> Animation:
     """Return the FAPs of a captured face: a face track that sends the FAPs that its shapes can move.
 
-    rate: frames per second; None for the motion's own. Frames lie at whole multiples of its period from the
-    source's first row on; values between two rows are interpolated, so that the animation keeps the times of
-    the source whatever its rate was. Rows without a face are bridged; if the first or the last ones have
-    none, the animation begins later or ends earlier.
+    rate: frames per second; None for that of the motion. Frames lie at whole multiples of its period from the
+    source's first row; values between two rows are interpolated, so that the animation keeps the times of the
+    source whatever its rate was. Rows without a face are bridged; at the beginning and the end they are left
+    out.
 
     Where the motion has angles of eyes that are not all 0, they turn the eyeballs (FAPs 23 to 26); otherwise
     the shapes that look aside do. Raises ModelError if no shape is known or no row has a face, LimitError for
@@ -46,13 +46,11 @@ def from_blendshapes(
     index = frame_numbers(motion.times[seen], rate, limits)
     limits.check_bytes(FRAME_BYTES * len(index), "the face", source=FRAME_BYTES * len(motion))
     at = index / float(rate)
-    angles = [one for one in (motion.head, motion.eyes) if one is not None]
-    weights, *turns = interpolate(
-        motion.times[seen], [motion.weights[seen], *(one[seen] for one in angles)], at, limits
-    )
+    recorded = [array for array in (motion.weights, motion.head, motion.eyes) if array is not None]
+    weights, *turns = interpolate(motion.times[seen], [array[seen] for array in recorded], at, limits)
     head = turns.pop(0) if motion.head is not None else None
     eyes = turns.pop(0) if motion.eyes is not None else None
-    track = convert_rows(motion.names, weights, _recorded(head), _recorded(eyes))
+    track = convert_rows(motion.names, weights, _unless_zero(head), _unless_zero(eyes))
     return Animation(rate, index, track, name=motion.name)
 
 
@@ -62,12 +60,12 @@ def convert_rows(
     """Return FAPs of rows of weights (T, N), and of angles (T, 3) and (T, 4) as `ShapeMotion` has them.
 
     head, eyes: None where the source does not record them; then the shapes that look aside turn the eyes.
-    Each row counts for itself. Raises ModelError if no shape is known and there are no angles.
+    Raises ModelError if no shape is known and there are no angles.
     """
     values = np.zeros((len(weights), FAP_COUNT))
     turned = np.zeros(FAP_COUNT, dtype=bool)
-    _turn(head, HEAD, values, turned)
-    _turn(eyes, EYES, values, turned)
+    _turn(head, HEAD_FAPS, values, turned)
+    _turn(eyes, EYE_FAPS, values, turned)
     amounts, moved = combine(dict(zip(names, weights.T, strict=True)), len(weights), but=turned)
     if not (moved | turned).any():
         listed = ", ".join(map(repr, names[:6]))
@@ -76,8 +74,8 @@ def convert_rows(
     return to_face_track(values, moved | turned)
 
 
-def _recorded(angles: Float64 | None) -> Float64 | None:
-    """Return angles, but None where all are 0, as where a source records none."""
+def _unless_zero(angles: Float64 | None) -> Float64 | None:
+    """Return the angles; None if all are 0, as in a source that records none."""
     return None if angles is None or not angles.any() else angles
 
 

@@ -8,10 +8,8 @@ FAPs have the amplitude that this project's own files use.
 
 from __future__ import annotations
 
-import csv
 import re
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
@@ -19,7 +17,9 @@ from fba.arrays import Bool, Float64
 from fba.face import Definitions
 from fba.face.gltf.morphs import morph_values
 from fba.face.shape_names import arkit_of, fap_of
+from fba.name_maps import both_sides
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
+from fba.source import read_table
 
 ARKIT_ORDER = tuple(
     """
@@ -38,7 +38,7 @@ ARKIT_ORDER = tuple(
 
 @cache
 def amounts_of(name: str) -> Float64 | None:
-    """Return FAPs (68,) of a shape at weight 1, by its name; None if it is not known."""
+    """Return FAPs (68,) of the shape of this name at weight 1; None for an unknown name."""
     number = fap_of(name)
     if number is not None:
         amounts = np.zeros(FAP_COUNT)
@@ -59,7 +59,7 @@ def largest_amounts() -> Float64:
 
 
 def with_mates(sent: Bool) -> Bool:
-    """Return a mask (68,) with the other side of every FAP in it, or else a decoder would copy this side."""
+    """Return a mask (68,) with the other side of each FAP, too; a decoder would otherwise copy this side."""
     result = np.array(sent)
     for fap in faps():
         if fap.left_right_mate is not None and sent[fap.left_right_mate - 1]:
@@ -68,7 +68,7 @@ def with_mates(sent: Bool) -> Bool:
 
 
 def key_of(name: str) -> str:
-    """Return a name without case and without all that is no letter or digit."""
+    """Return the letters and digits of a name, in lower case."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
@@ -76,11 +76,8 @@ def key_of(name: str) -> str:
 def _table() -> dict[str, Float64]:
     """Return FAPs (68,) at weight 1 by the key of each shape's name."""
     table: dict[str, Float64] = {}
-    text = (files(__package__) / "shape_faps.csv").read_text(encoding="utf-8")
-    for row in csv.DictReader(text.splitlines()):
-        sides = re.search(r"\((\w+)\|(\w+)\)", row["shape"])
-        for side, word in zip("lr", sides.groups(), strict=True) if sides else [("", "")]:
-            name = row["shape"].replace(sides[0], word) if sides else row["shape"]
+    for row in read_table(__package__, "shape_faps.csv"):
+        for side, name in both_sides(row["shape"]):
             table[key_of(name)] = _amounts((row["faps"] or "").replace("?", side))
     return table
 

@@ -1,7 +1,7 @@
 """A captured motion beside the person that a decoder shows: measures, and a verdict.
 
-The source's bones come from its own forward kinematics, those of the result from BAPs: what retargeting
-assumes of rest poses has no part in it, so that a wrong rest pose is seen and not explained away.
+The source's bones come from its forward kinematics, those of the result from BAPs. What retargeting assumes
+of rest poses is not used, so that a wrong rest pose shows.
 
 May use: parameters, the body, and captured motion.
 """

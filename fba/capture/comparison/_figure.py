@@ -1,4 +1,4 @@
-"""`Figure`: where joints are and how they are turned, of the source and of the result, in the same terms."""
+"""`Figure`: positions and rotations of joints, in the same form for the source and the result."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from fba.geometry import nearest_rotation
 from fba.rotations import unit
 
 FINGERS = ("index", "middle", "ring", "pinky")
-LEVEL = 0.6
-"""Length of the mean direction from feet to head along an axis above which a person stands along it."""
-STRAIGHT = 0.9
-"""Distance from feet to head, of that by way of the hips, above which a person stands or lies stretched."""
+MIN_STANDING_LENGTH = 0.6
+"""Smallest component of the mean direction from feet to head along the axis along which a person stands."""
+MIN_STRETCH = 0.9
+"""Smallest ratio of the distance from feet to head to the distance via the hips of a stretched person."""
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
     """A moving person.
 
-    points: joint of the standard -> (T, 3), metres, y up. frames: joint -> (T, 3, 3), rotations of its own
-    axes, whatever these are. tips: joint -> (T, 3), the end of its bone where no joint is: of heads,
-    hands and feet.
+    points: joint of the standard -> (T, 3), metres, y up. frames: joint -> (T, 3, 3), rotations of its axes,
+    in whatever directions these are. tips: joint -> (T, 3), the end of its bone if no joint is there: of
+    heads, hands and feet.
     """
 
     points: Mapping[str, Float64]
@@ -36,29 +36,28 @@ class Figure:
     tips: Mapping[str, Float64] = field(default_factory=dict)
 
     def direction(self, start: str, end: str) -> Float64 | None:
-        """Return unit vectors (T, 3) from a joint to another, or None where one is missing."""
+        """Return unit vectors (T, 3) from a joint to another; None if either is missing."""
         if start not in self.points or end not in self.points:
             return None
         return unit(self.points[end] - self.points[start])
 
     def middle(self, joint: str) -> Float64 | None:
-        """Return (T, 3), the point between a left and a right joint, or None."""
+        """Return the points (T, 3) between a left and a right joint, or None."""
         if f"l_{joint}" not in self.points or f"r_{joint}" not in self.points:
             return None
-        result: Float64 = (self.points[f"l_{joint}"] + self.points[f"r_{joint}"]) / 2
-        return result
+        return (self.points[f"l_{joint}"] + self.points[f"r_{joint}"]) / 2
 
     def toe(self, side: str) -> Float64 | None:
-        """Return (T, 3), the ball or the tip of a foot, or None."""
+        """Return the ball (T, 3) or the tip of a foot, or None."""
         return self.points.get(f"{side}_metatarsal", self.tips.get(f"{side}_ankle"))
 
     def knuckles(self, side: str) -> dict[str, Float64]:
-        """Return finger -> (T, 3), the knuckles of a hand that are there, from the forefinger on."""
+        """Return finger -> knuckle (T, 3) of a hand, from the forefinger on, without missing fingers."""
         names = {finger: f"{side}_{finger}1" for finger in FINGERS}
         return {finger: self.points[name] for finger, name in names.items() if name in self.points}
 
     def palm(self, side: str, fingers: tuple[str, str]) -> Float64:
-        """Return unit normals (T, 3) of a hand between the knuckles of two fingers, out of its palm."""
+        """Return unit normals (T, 3) that point out of a palm, by the knuckles of two fingers."""
         wrist = self.points[f"{side}_wrist"]
         first, last = (self.points[f"{side}_{finger}1"] - wrist for finger in fingers)
         return unit(np.cross(last, first) if side == "l" else np.cross(first, last))
@@ -92,10 +91,10 @@ def result_figure(solver: BapSolver, baps: Array) -> Figure:
 
 
 def find_up(motion: SkeletonMotion, mapped: Mapping[str, int]) -> Float64:
-    """Return (3, 3), the rotation of the source's frame that brings up what is up in its motion.
+    """Return the rotation (3, 3) of the source's frame that makes y point up.
 
-    That is the one that the format names, else the axis along which the person stands; where nobody does, the
-    one from feet to head in most frames, else that of the rest pose. `prepare` looks for a floor besides.
+    Up is the axis that the format names, else the axis along which the person stands; if nobody stands, that
+    from feet to head in most frames, else that of the rest pose. `prepare` also looks for a floor.
     """
     top = [mapped[j] for j in ("skullbase", "vc7", "l_shoulder", "r_shoulder") if j in mapped]
     low = [mapped[j] for j in ("l_ankle", "r_ankle", "l_knee", "r_knee") if j in mapped]
@@ -108,16 +107,16 @@ def find_up(motion: SkeletonMotion, mapped: Mapping[str, int]) -> Float64:
     middle = [mapped[j] for j in ("l_hip", "r_hip") if j in mapped] or [mapped[ROOT]]
     head, hips, feet = (positions[:, joints].mean(axis=1) for joints in (top, middle, low))
     reach = np.linalg.norm(head - hips, axis=1) + np.linalg.norm(hips - feet, axis=1)
-    straight = np.linalg.norm(head - feet, axis=1) > STRAIGHT * reach
+    straight = np.linalg.norm(head - feet, axis=1) > MIN_STRETCH * reach
     axis = np.array([0.0, 1.0, 0.0])
-    for stands in (
+    for directions in (
         unit(head - feet)[straight],
         unit(head - feet),
         unit(rest[:, top].mean(axis=1) - rest[:, low].mean(axis=1)),
     ):
-        mean = stands.mean(axis=0) if len(stands) else np.zeros(3)
+        mean = directions.mean(axis=0) if len(directions) else np.zeros(3)
         strongest = int(np.argmax(np.abs(mean)))
-        if abs(mean[strongest]) > LEVEL:
+        if abs(mean[strongest]) > MIN_STANDING_LENGTH:
             axis = np.eye(3)[strongest] * np.sign(mean[strongest])
             break
     return rotations.between(axis, np.array([0.0, 1.0, 0.0]))
@@ -151,7 +150,7 @@ def mean_rotation(turns: Float64) -> Float64:
 
 
 def _ends(motion: SkeletonMotion, joint: int, frames: Float64, metres: float) -> list[Float64]:
-    """Return (T, 3) from a joint to each end or child. frames: (T, 3, 3), from its axes to the world."""
+    """Return the lines (T, 3) from a joint to each end or child. frames: (T, 3, 3), its axes in the world."""
     offsets = [motion.end_offsets[n] for n in np.flatnonzero(motion.end_parents == joint)]
     offsets += [motion.offsets[n] for n in np.flatnonzero(motion.parents == joint)]
     return [frames @ (offset * metres) for offset in offsets if np.linalg.norm(offset) > 0]

@@ -30,10 +30,10 @@ PIECE_FRAMES = 8192
 RUN_COUNT = 4
 """Number of runs of frames that represent a long motion."""
 UNKNOWN_UNIT = 0.01
-"""Metres in one unit of a source whose size no limb tells, as for `from_skeleton`."""
+"""Metres in a unit of a source without limbs that tell its size, as for `from_skeleton`."""
 MIN_MOTION = 10.0
 """Degrees that a joint must turn to count as moving."""
-LIMBS = {
+LIMB_JOINTS = {
     "left arm": ("l_shoulder", "l_elbow"), "right arm": ("r_shoulder", "r_elbow"),
     "left leg": ("l_hip", "l_knee"), "right leg": ("r_hip", "r_knee"), "head": ("skullbase", "vc7"),
 }  # fmt: skip
@@ -55,13 +55,13 @@ def compare(
     solver: BapSolver | None = None,
     most: int | None = None,
 ) -> Comparison:
-    """Return how an animation, best a decoded one, differs from the motion that it was made from.
+    """Return how an animation, best after decoding, differs from the motion that it was made from.
 
-    mapped: joint of the standard -> number of the source's. scale: metres of the body in one unit of the
-    source; None for the ratio of legs, or else arms. up: (3, 3), what brings up the source's axis; None for
-    what `find_up` returns. level: height of the floor in metres; None without a floor, then soles may be
-    at any height, but the same everywhere. solver: as for `from_skeleton`. most: frames that are compared, in
-    four runs evenly spread, of a motion that has more; None for all.
+    mapped: joint of the standard -> number of the source's. scale: metres of the body in a unit of the
+    source; None for the ratio of legs, or else arms. up: (3, 3), the rotation that makes the source's y point
+    up; None for that of `find_up`. level: height of the floor in metres; None without a floor: soles may then
+    be at any constant height. solver: as for `from_skeleton`. most: largest number of frames to compare: a
+    longer motion is compared in four runs, spread evenly; None for no limit.
 
     If rates differ, the motion is resampled; frames that only one of the two has are left out. ModelError if
     the animation has no body or no frame in common with the motion.
@@ -84,7 +84,7 @@ def compare(
     floor = find_floor(
         (figure.source_figure(motion.select(piece), mapped, up, metres) for piece in pieces), rate
     )
-    found: dict[tuple[str, str], list[Difference]] = {}
+    by_part: dict[tuple[str, str], list[Difference]] = {}
     for piece in pieces:
         baps = animation.body.values[piece]
         source = figure.source_figure(motion.select(piece), mapped, up, metres)
@@ -92,11 +92,10 @@ def compare(
         soles = sole_heights(solver, baps)
         for row in _measure(source, result, rest, neutral, soles, rate, level, floor):
             kept = row._replace(values=np.where(lost[piece], np.nan, row.values))
-            one = _difference(kept, rate, piece.start)
-            found.setdefault((one.measure, one.part), []).append(one)
+            by_part.setdefault((row.name, row.part), []).append(_difference(kept, rate, piece.start))
     differences = [
-        replace(max(ones, key=lambda one: one.worst), typical=float(np.mean([one.typical for one in ones])))
-        for ones in found.values()
+        replace(max(parts, key=lambda part: part.worst), typical=float(np.mean([p.typical for p in parts])))
+        for parts in by_part.values()
     ]
     differences += _unmatched(first, mapped)
     if tears.any():
@@ -106,7 +105,7 @@ def compare(
 
 
 def _pieces(count: int, most: int | None) -> list[slice]:
-    """Return the frames to be compared, in pieces."""
+    """Return the frames to compare, in pieces."""
     if most is None or count <= most:
         return [slice(begin, min(begin + PIECE_FRAMES, count)) for begin in range(0, count, PIECE_FRAMES)]
     length = most // RUN_COUNT
@@ -117,9 +116,9 @@ def _pieces(count: int, most: int | None) -> list[slice]:
 
 
 def source_scale(motion: SkeletonMotion, mapped: Mapping[str, int], neutral: Figure, up: Float64) -> float:
-    """Return metres of the body in one unit of the source, by the lengths of limbs; 0.01 without limbs."""
-    theirs = figure.leg_lengths(figure.source_figure(motion.select(slice(0, 1)), mapped, up, 1.0))
-    return figure.leg_lengths(neutral) / theirs if theirs > 0 else UNKNOWN_UNIT
+    """Return metres of the body in a unit of the source, by the lengths of limbs; 0.01 without limbs."""
+    length = figure.leg_lengths(figure.source_figure(motion.select(slice(0, 1)), mapped, up, 1.0))
+    return figure.leg_lengths(neutral) / length if length > 0 else UNKNOWN_UNIT
 
 
 def _measure(
@@ -158,7 +157,7 @@ def _difference(row: Row, rate: float, begin: int) -> Difference:
 
 
 def _unmatched(motion: SkeletonMotion, mapped: Mapping[str, int]) -> list[Difference]:
-    """Return the limbs that nothing was matched with, if the source has joints that move and are not used."""
+    """Return the limbs without a source, if the source has joints that move and are not mapped."""
     used = set(mapped.values())
     from_first = np.abs((motion.rotations * motion.rotations[:1]).sum(axis=-1)).min(axis=0)
     turned = np.degrees(2 * np.arccos(np.clip(from_first, 0.0, 1.0)))
@@ -167,13 +166,13 @@ def _unmatched(motion: SkeletonMotion, mapped: Mapping[str, int]) -> list[Differ
     ]
     return [
         Difference("unmatched", limb, float(len(moving)), float(len(moving)), 0)
-        for limb, joints in LIMBS.items()
+        for limb, joints in LIMB_JOINTS.items()
         if moving and not any(joint in mapped for joint in joints)
     ]
 
 
 def rest_figure(motion: SkeletonMotion, mapped: Mapping[str, int], up: Float64, metres: float) -> Figure:
-    """Return the source in the rest pose that its file has, whatever that is."""
+    """Return the source in the rest pose of its file."""
     unturned = np.tile([1.0, 0.0, 0.0, 0.0], (1, len(motion.names), 1))
     return figure.source_figure(replace(motion.select(slice(0, 1)), rotations=unturned), mapped, up, metres)
 
@@ -211,7 +210,7 @@ def _sole_model() -> BodyModel:
 
 
 def _keep_vertices(part: BodyPart, kept: Array) -> BodyPart:
-    """Return a part with these vertices only, and a single triangle, which is never drawn."""
+    """Return a part with these vertices only, and a single triangle, which nobody draws."""
     return BodyPart(
         part.name, part.kind, part.vertices[kept], np.array([[0, 1, 2]], dtype=np.int32),
         part.joints[kept], part.weights[kept],

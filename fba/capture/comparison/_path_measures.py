@@ -1,6 +1,6 @@
-"""How a result goes otherwise than its source: its way, its soles and the floor, and from frame to frame.
+"""Measures of paths: of the hips, of soles and the floor, and from frame to frame.
 
-Each function returns rows of `Row`: name, part and values (T,), 0 or more; NaN where nothing can be compared.
+Each function yields a `Row` for each part: values (T,), 0 or more; NaN where nothing can be compared.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.body import SIDES
+from fba.body.skeleton import ROOT
 from fba.capture.comparison._figure import Figure, degrees_turned
 from fba.capture.comparison._pose_measures import LIMBS, TURNING, WORDS, Row
 from fba.capture.comparison._standing import foot_points
@@ -20,17 +21,16 @@ HINGED = {"shoulder": ("shoulder", "elbow", "wrist"), "hip": ("hip", "knee", "an
 """The joints of limbs whose middle one is a hinge, by the first."""
 MIN_BEND = 0.12
 """Smallest sine of the bend of an elbow or a knee at which its plane is defined."""
-TEAR_DISTANCE = 0.5
-"""Metres that hips do not move from one frame to the next."""
-TEAR_SPEED = 20.0
-"""Metres per second that hips do not reach."""
+MAX_STEP = 0.5
+"""Largest possible distance of hips from one frame to the next, in metres."""
+MAX_SPEED = 20.0
+"""Largest possible speed of hips, in metres per second."""
 
 
 def paths(source: Figure, result: Figure) -> Iterator[Row]:
-    """Distances in mm between the hips; where both are on the whole does not count (`--origin`)."""
-    theirs, ours = (pelvis(one) for one in (source, result))
-    if theirs is not None and ours is not None:
-        apart = ours - theirs
+    """Distances in mm between the hips, apart from a constant shift (`--origin`)."""
+    apart = _hips_apart(source, result)
+    if apart is not None:
         yield Row("path", "hips", 1000 * np.linalg.norm(apart - np.median(apart, axis=0), axis=1))
 
 
@@ -44,96 +44,106 @@ def floors(
     """Heights in mm by which soles miss the floor while the source's foot stands; NaN in other frames.
 
     soles: by side (T,), height in metres of the lowest point of the person's shoe. level: height of the
-    floor, None for that where the feet stand most. ground: that of the source, see `find_floor`; None for
-    what these frames say. The source's foot is level where it usually stands. Where
-    it is lower, since its ground drifts, the person's is on the floor; or as low, if there is no floor.
+    floor; None for the height at which the feet usually stand. ground: height of the source's floor, see
+    `find_floor`; None to find it in these frames. Where the source's foot is lower, since its ground drifts,
+    the person's sole should be on the floor; without a floor it may also be as low as the source's.
     """
-    heights = {side: _lowest(source, side) for side in soles}
-    known = {side: height for side, height in heights.items() if height is not None and standing[side].any()}
-    if not known:
+    heights = {
+        side: height
+        for side in soles
+        if (height := _lowest(source, side)) is not None and standing[side].any()
+    }
+    if not heights:
         return
     if ground is None:
-        ground = float(np.median(np.concatenate([known[side][standing[side]] for side in known])))
-    own = np.concatenate([soles[side][standing[side]] for side in known])
-    floor = float(np.median(own)) if level is None else level
-    for side, height in known.items():
-        above, own_sole = height - ground, soles[side] - floor
+        ground = float(np.median(np.concatenate([heights[side][standing[side]] for side in heights])))
+    if level is None:
+        floor = float(np.median(np.concatenate([soles[side][standing[side]] for side in heights])))
+    else:
+        floor = level
+    for side, height in heights.items():
+        above, sole = height - ground, soles[side] - floor
         highest = np.maximum(above, 0.0)
         lowest = above if level is None else highest
-        off = np.maximum(np.maximum(lowest - own_sole, own_sole - highest), 0.0)
+        off = np.maximum(np.maximum(lowest - sole, sole - highest), 0.0)
         yield Row("floor", f"{WORDS[side]} sole", np.where(standing[side], 1000 * off, np.nan))
 
 
 def slips(source: Figure, result: Figure, standing: dict[str, Bool], rate: float) -> Iterator[Row]:
     """Speeds in cm/s at which standing feet slip along the floor while the source's do not; NaN elsewhere."""
     for side in SIDES:
-        toe, shown = source.toe(side), result.toe(side)
-        if side not in standing or toe is None or shown is None:
+        toe, result_toe = source.toe(side), result.toe(side)
+        if side not in standing or toe is None or result_toe is None:
             continue
-        change = np.diff(shown - toe, axis=0, append=(shown - toe)[-1:])[:, [0, 2]]
+        apart = result_toe - toe
+        change = np.diff(apart, axis=0, append=apart[-1:])[:, [0, 2]]
         speed = 100 * rate * np.linalg.norm(change, axis=1)
         yield Row("slip", f"{WORDS[side]} foot", np.where(standing[side], speed, np.nan))
 
 
 def jumps(source: Figure, result: Figure) -> Iterator[Row]:
-    """Angles in degrees, and ways in mm, by which parts move from frame to frame, and the source's do not."""
-    pairs = [(part, joint, shown) for part, joint, shown in TURNING]
-    pairs += [
-        (f"{WORDS[side]} {what}", f"{side}_{start}", f"{side}_{start}")
+    """Angles in degrees, and distances in mm, by which parts move between frames more than the source's."""
+    limbs = [
+        (f"{WORDS[side]} {bone}", f"{side}_{start}", f"{side}_{start}")
         for side in SIDES
-        for what, start, _ in LIMBS
+        for bone, start, _ in LIMBS
     ]
-    for part, joint, shown in pairs:
+    for part, joint, shown in (*TURNING, *limbs):
         if joint not in source.frames or shown not in result.frames:
             continue
-        theirs, ours = _steps(source.frames[joint]), _steps(result.frames[shown])
+        steps = _steps(source.frames[joint])
         if joint[2:] in HINGED and shown == joint:
-            theirs = np.maximum(theirs, _plane_steps(source, joint))
-        near = np.pad(theirs, 1, mode="edge")
+            steps = np.maximum(steps, _plane_steps(source, joint))
+        near = np.pad(steps, 1, mode="edge")
         most = np.maximum(np.maximum(near[:-2], near[1:-1]), near[2:])
-        yield Row("jump", part, np.maximum(ours - most, 0.0))
-    hips = [pelvis(one) for one in (source, result)]
-    if hips[0] is not None and hips[1] is not None:
-        theirs, ours = hips[0], hips[1]
-        apart = np.diff(ours - theirs, axis=0, prepend=(ours - theirs)[:1])
-        yield Row("leap", "hips", 1000 * np.linalg.norm(apart, axis=1))
+        yield Row("jump", part, np.maximum(_steps(result.frames[shown]) - most, 0.0))
+    apart = _hips_apart(source, result)
+    if apart is not None:
+        change = np.diff(apart, axis=0, prepend=apart[:1])
+        yield Row("leap", "hips", 1000 * np.linalg.norm(change, axis=1))
 
 
 def find_tears(root: Float64, rate: float) -> tuple[Bool, Float64]:
-    """Return bool (T,), frames before or after a tear in the capture, and metres (T,) of each tear.
+    """Return the frames (T,) that are torn off from the capture, and the length (T,) of each tear, metres.
 
-    A tear is a leap that nobody makes, as where a camera lost a person: the longest part between two tears is
-    the capture. root: (T, 3), its path in metres.
+    A tear is an impossible leap, as where a camera lost a person; the longest part between two tears is the
+    capture. root: (T, 3), its path in metres.
     """
     leaps = np.linalg.norm(np.diff(root, axis=0, prepend=root[:1]), axis=1)
-    torn = (leaps > TEAR_DISTANCE) & (leaps * rate > TEAR_SPEED)
+    torn = (leaps > MAX_STEP) & (leaps * rate > MAX_SPEED)
     part = np.cumsum(torn)
     lost: Bool = (part != int(np.bincount(part).argmax())) | torn
     return lost, np.where(torn, leaps, 0.0)
 
 
 def pelvis(figure: Figure) -> Float64 | None:
-    """Return (T, 3), the point between the hips, else the root; None without either."""
+    """Return the point (T, 3) between the hips, else the root; None without either."""
     middle = figure.middle("hip")
-    return figure.points.get("HumanoidRoot") if middle is None else middle
+    return figure.points.get(ROOT) if middle is None else middle
+
+
+def _hips_apart(source: Figure, result: Figure) -> Float64 | None:
+    """Return the lines (T, 3) from the source's hips to the result's; None where either has no hips."""
+    start, end = pelvis(source), pelvis(result)
+    return None if start is None or end is None else end - start
 
 
 def _lowest(figure: Figure, side: str) -> Float64 | None:
-    """Return (T,), the height of the lowest point of a foot."""
+    """Return the heights (T,) of the lowest point of a foot."""
     points = foot_points(figure, side)
     return np.min([point[:, 1] for point in points], axis=0) if points else None
 
 
 def _steps(frames: Float64) -> Float64:
-    """Return (T,), angles in degrees from each frame to the next before it; 0 for the first."""
+    """Return the angles (T,), in degrees, of the turns from frame to frame; 0 for the first."""
     return np.concatenate([[0.0], degrees_turned(np.swapaxes(frames[:-1], 1, 2) @ frames[1:])])
 
 
 def _plane_steps(source: Figure, joint: str) -> Float64:
-    """Return (T,), angles in degrees by which the plane of a bent limb turns from the frame before.
+    """Return the angles (T,), in degrees, by which the plane of a bent limb turns from the frame before.
 
-    An elbow or a knee of the body bends about one axis: where the plane of the source's leaps, the upper bone
-    turns about its length. 0 where the limb is straight, and for the first frame.
+    An elbow or a knee of the body bends about a single axis: where the source's plane leaps, the body's upper
+    bone turns about its length. 0 where the limb is straight, and for the first frame.
     """
     side, upper = joint.split("_")
     names = [f"{side}_{name}" for name in HINGED[upper]]

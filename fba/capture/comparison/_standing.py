@@ -15,7 +15,6 @@ MAX_STANDING_SPEED = 0.25
 """Largest speed of a standing foot, in metres per second."""
 MAX_STANDING_HEIGHT = 0.05
 """Largest height of a standing foot above the lowest heights, in metres."""
-
 MAX_HEIGHT_DIFFERENCE = 0.3
 """Largest height, in metres, of a standing foot above the other: one that is always higher is in the air."""
 
@@ -23,8 +22,8 @@ MAX_HEIGHT_DIFFERENCE = 0.3
 class Floor(NamedTuple):
     """Where the feet of a source stand, in metres.
 
-    lows: by side, the height up to which a foot may stand. ground: where feet stand most; None if they never
-    do.
+    lows: by side, the largest height at which a foot may stand. ground: the usual height at which feet stand;
+    None if they never do.
     """
 
     lows: dict[str, float]
@@ -32,7 +31,7 @@ class Floor(NamedTuple):
 
 
 def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
-    """Return where feet stand in all pieces of a motion together: one of them may be all in the air."""
+    """Return where feet stand in all pieces of a motion together: in a piece they may never stand."""
     still: dict[str, list[Bool]] = {side: [] for side in SIDES}
     ends: dict[str, list[Float64]] = {side: [] for side in SIDES}
     lowest: dict[str, list[Float64]] = {side: [] for side in SIDES}
@@ -42,13 +41,14 @@ def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
                 still[side].append(_still(points, rate))
                 ends[side].append(points[-1][:, 1])
                 lowest[side].append(np.min([point[:, 1] for point in points], axis=0))
-    known = [side for side in SIDES if ends[side]]
-    heights = {side: np.concatenate(ends[side]) for side in known}
-    lows = {side: float(np.percentile(heights[side], 5)) + MAX_STANDING_HEIGHT for side in known}
+    heights = {side: np.concatenate(ends[side]) for side in SIDES if ends[side]}
+    lows = {side: float(np.percentile(at, 5)) + MAX_STANDING_HEIGHT for side, at in heights.items()}
     lowest_of_both = min(lows.values(), default=0.0)
     lows = {side: min(low, lowest_of_both + MAX_HEIGHT_DIFFERENCE) for side, low in lows.items()}
-    stands = {side: np.concatenate(still[side]) & (heights[side] < lows[side]) for side in known}
-    standing = [np.concatenate(lowest[side])[stands[side]] for side in known]
+    standing = [
+        np.concatenate(lowest[side])[np.concatenate(still[side]) & (at < lows[side])]
+        for side, at in heights.items()
+    ]
     together = np.concatenate(standing) if standing else np.zeros(0)
     return Floor(lows, float(np.median(together)) if len(together) else None)
 
@@ -63,15 +63,12 @@ def find_standing(source: Figure, rate: float, lows: Mapping[str, float]) -> dic
 
 
 def foot_points(source: Figure, side: str) -> list[Float64]:
-    """Return (T, 3), the ankle and the end of a foot, as far as they are known."""
-    return [p for p in (source.points.get(f"{side}_ankle"), source.toe(side)) if p is not None]
+    """Return the ankle (T, 3) and the end (T, 3) of a foot, without those that are missing."""
+    return [point for point in (source.points.get(f"{side}_ankle"), source.toe(side)) if point is not None]
 
 
 def _still(points: Sequence[Float64], rate: float) -> Bool:
     """Return bool (T,): whether any of the points (T, 3) hardly moves."""
-    result = np.zeros(len(points[0]), dtype=np.bool_)
-    for point in points:
-        result |= (
-            np.linalg.norm(np.diff(point, axis=0, append=point[-1:]), axis=1) * rate < MAX_STANDING_SPEED
-        )
-    return result
+    steps = np.diff(points, axis=1, append=np.array(points)[:, -1:])
+    still: Bool = (np.linalg.norm(steps, axis=2) * rate < MAX_STANDING_SPEED).any(axis=0)
+    return still

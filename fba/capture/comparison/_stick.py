@@ -1,4 +1,4 @@
-"""The source as a stick figure, with palms and soles as areas."""
+"""`Stick`: the source as a stick figure, with palms and soles as areas."""
 
 from __future__ import annotations
 
@@ -20,13 +20,15 @@ from fba.capture.motion import SkeletonMotion
 from fba.parameters import BAP_COUNT
 from fba.rotations import unit
 
-SOLE = (0.045, -0.03)
-"""Metres from the middle of a foot to its side, and from under the ankle to the heel."""
+SOLE_HALF_WIDTH = 0.045
+"""Distance from the middle of a sole to its side, in metres."""
+HEEL_LENGTH = 0.03
+"""Distance from under the ankle to the back of the heel, in metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stick:
-    """A stick figure at the place of the person it is compared with, in metres.
+    """A stick figure, in metres, at the place of the person that it is compared with.
 
     lines: (N, 2, 3), ends of bones. sides: N times "l", "r" or "". palms: (4, 3) each, from wrist to
     knuckles, counter-clockwise as seen from outside the palm. soles: (4, 3) each.
@@ -39,7 +41,7 @@ class Stick:
 
     @property
     def corners(self) -> Float64:
-        """(K, 3), all points of its bones."""
+        """All points (K, 3) of its bones."""
         return self.lines.reshape(-1, 3)
 
 
@@ -52,7 +54,7 @@ def find_sticks(
     scale: float | None = None,
     up: Float64 | None = None,
 ) -> list[Stick]:
-    """Return the source at some frames, moved to where the result stands; see `measurement.compare`."""
+    """Return the source in some frames, moved to where the result stands; see `measurement.compare`."""
     solver = BapSolver(BodyModel.default().skeleton)  # of the person that is drawn
     assert animation.body is not None
     motion = motion.resample(animation.rate)
@@ -64,18 +66,18 @@ def find_sticks(
     rate = float(motion.rate)
     standing = find_standing(usual, rate, find_floor([usual], rate).lows)
     levels = pose_measures.level_soles(usual, standing, measurement.rest_figure(motion, mapped, up, metres))
-    ground = min((float(np.percentile(p[:, 1], 5)) for p in _toes(usual)), default=0.0)
+    ground = min((float(np.percentile(toe[:, 1], 5)) for toe in _toes(usual)), default=0.0)
     numbers = np.array(frames, dtype=np.intp)
     chosen = motion.select(numbers)
     source = figure.source_figure(chosen, mapped, up, metres)
     result = figure.result_figure(solver, animation.body.values[numbers])
-    own = min((float(np.median(p[:, 1])) for p in _toes(neutral)), default=0.0)
+    result_ground = min((float(np.median(toe[:, 1])) for toe in _toes(neutral)), default=0.0)
     turned, positions = chosen.world()
     positions = positions @ up.T * metres
     sides = _sides(motion, mapped)
     sticks = []
     for row in range(len(chosen)):
-        shift = np.array([0.0, own - ground, 0.0])
+        shift = np.array([0.0, result_ground - ground, 0.0])
         hips = path_measures.pelvis(source), path_measures.pelvis(result)
         if hips[0] is not None and hips[1] is not None:
             shift[[0, 2]] = (hips[1] - hips[0])[row, [0, 2]]
@@ -106,23 +108,23 @@ def find_sticks(
 
 
 def _sole(ankle: Float64, toe: Float64, up: Float64) -> Float64:
-    """Return (4, 3), the area under a foot."""
+    """Return the corners (4, 3) of the area under a foot."""
     ahead = toe - ankle
     ahead = ahead - up * (ahead @ up)
     under = min(float((toe - ankle) @ up), -0.02)
-    heel, ball = ankle + up * under + unit(ahead) * SOLE[1], ankle + ahead + up * under
-    across = np.cross(up, unit(ahead)) * SOLE[0]
+    heel, ball = ankle + up * under - unit(ahead) * HEEL_LENGTH, ankle + ahead + up * under
+    across = np.cross(up, unit(ahead)) * SOLE_HALF_WIDTH
     return np.array([heel - across, heel + across, ball + across, ball - across])
 
 
-def _toes(one: figure.Figure) -> list[Float64]:
-    return [toe for side in SIDES if (toe := one.toe(side)) is not None]
+def _toes(person: figure.Figure) -> list[Float64]:
+    return [toe for side in SIDES if (toe := person.toe(side)) is not None]
 
 
 def _sides(motion: SkeletonMotion, mapped: Mapping[str, int]) -> list[str]:
-    """Return "l", "r" or "" for each joint of the source; those not matched are as their parents."""
-    known = {number: joint[0] if joint[:2] in ("l_", "r_") else "" for joint, number in mapped.items()}
+    """Return "l", "r" or "" for each joint of the source; unmapped joints have the sides of their parents."""
+    sides = {number: joint[0] if joint[:2] in ("l_", "r_") else "" for joint, number in mapped.items()}
     result: list[str] = []
     for joint, parent in enumerate(motion.parents):
-        result.append(known.get(joint, result[parent] if parent >= 0 else ""))
+        result.append(sides.get(joint, result[parent] if parent >= 0 else ""))
     return result

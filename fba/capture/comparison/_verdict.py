@@ -1,11 +1,11 @@
-"""What is good, fair or poor: the bounds of every measure, and the parts that differ most."""
+"""Verdicts good, fair and poor: the bounds of every measure, and the parts that differ most."""
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+
+from fba.source import read_table
 
 GRADES = ("good", "fair", "poor")
 
@@ -30,9 +30,8 @@ class Bounds:
 @cache
 def bounds() -> dict[str, Bounds]:
     """Return the bounds by measure."""
-    text = (files(__package__) / "thresholds.csv").read_text(encoding="utf-8")
     result = {}
-    for row in csv.DictReader(text.splitlines()):
+    for row in read_table(__package__, "thresholds.csv"):
         hold, fair, poor = (float(row[name]) for name in ("hold", "fair", "poor"))
         name = row["measure"]
         result[name] = Bounds(name, row["unit"], hold, fair, poor, row["says"], row["phrase"])
@@ -43,8 +42,8 @@ def bounds() -> dict[str, Bounds]:
 class Difference:
     """How far a part of the result differs from the source.
 
-    measure: one of `bounds`. part: "left hand". typical: median over all frames. worst: largest difference
-    that lasts as long as the bounds say. frame: where that is.
+    measure: a key of `bounds`. part: "left hand". typical: median over all frames. worst: largest difference
+    that lasts as long as the bounds say. frame: where the worst is.
     """
 
     measure: str
@@ -74,7 +73,7 @@ class Difference:
 class Comparison:
     """A captured motion beside the person that a decoder shows.
 
-    frames: how many were compared. differences: those that matter most first.
+    frames: number of compared frames. differences: the most severe first.
     """
 
     frames: int
@@ -83,29 +82,29 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """`good`, `fair` or `poor`: that of the worst difference."""
-        return GRADES[max((GRADES.index(one.grade) for one in self.differences), default=0)]
+        return max((each.grade for each in self.differences), key=GRADES.index, default=GRADES[0])
 
     @property
     def reasons(self) -> tuple[Difference, ...]:
         """Differences that are as bad as the verdict; none if it is good."""
         grade = self.verdict
-        return tuple(one for one in self.differences if one.grade == grade) if grade != GRADES[0] else ()
+        return tuple(each for each in self.differences if each.grade == grade != GRADES[0])
 
     def with_more(self, more: tuple[Difference, ...]) -> Comparison:
-        """Return the comparison with other differences among its own."""
+        """Return the comparison with more differences."""
         return Comparison(self.frames, in_order((*self.differences, *more)))
 
     def worst_frames(self, count: int, apart: int) -> tuple[Difference, ...]:
-        """Return at most `count` differences, the worst first, of parts and frames that lie apart."""
+        """Return at most `count` differences, the worst first, of different parts and distant frames."""
         chosen: list[Difference] = []
-        for one in self.differences:
-            if all(abs(one.frame - other.frame) >= apart and one.part != other.part for other in chosen):
-                chosen.append(one)
+        for each in self.differences:
+            if all(abs(each.frame - other.frame) >= apart and each.part != other.part for other in chosen):
+                chosen.append(each)
             if len(chosen) == count:
                 break
         return tuple(chosen)
 
 
 def in_order(differences: tuple[Difference, ...]) -> tuple[Difference, ...]:
-    """Return differences, those that matter most first."""
-    return tuple(sorted(differences, key=lambda one: (-one.severity, one.measure, one.part)))
+    """Return differences, the most severe first."""
+    return tuple(sorted(differences, key=lambda each: (-each.severity, each.measure, each.part)))

@@ -1,4 +1,4 @@
-"""Markers that take each other's names in the middle of a take, as trackers confuse those that come near."""
+"""Markers that exchange their names in the middle of a take, as trackers confuse close ones."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 from fba.arrays import Float64
 
 MIN_JUMP = 0.05
-"""Share of the face's size by which a marker jumps, relative to the others, when it takes another's name."""
-EXCHANGED_RATIO = 0.4
-"""Two markers are exchanged if they come nearer to each other's last places than this share of the distances
-to their own."""
+"""Smallest jump, relative to the others, of a marker that takes another's name, in sizes of the face."""
+MAX_EXCHANGED_RATIO = 0.4
+"""Largest ratio of the distances of two exchanged markers from each other's last places to the distances from
+their own."""
 MAX_JUMPS = 20
 """Largest number of markers that jump in a frame; more are a cut, or another take."""
 SAMPLE_FRAMES = 100
 """Approximate number of frames from which the face's size is measured."""
 MAX_EXCHANGES = 200
-"""Largest number of exchanges that are undone; more are noise."""
+"""Largest number of exchanges in a take; more are noise, and none is undone."""
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Two markers that have each other's names from a frame on."""
+    """Two markers that exchange their names in a frame."""
 
     frame: int
     one: str
@@ -31,7 +31,7 @@ class Exchange:
 
 
 def undo_exchanges(names: tuple[str, ...], positions: Float64) -> tuple[Float64, list[Exchange]]:
-    """Return positions (T, M, 3) with exchanges undone, and these in order.
+    """Return positions (T, M, 3) with exchanges undone, and the exchanges in order.
 
     positions: NaN for gaps, in any unit of length.
     """
@@ -53,7 +53,7 @@ def undo_exchanges(names: tuple[str, ...], positions: Float64) -> tuple[Float64,
             b = int(together[a].argmin())
             if (
                 b > a
-                and together[a, b] < EXCHANGED_RATIO * (own[a] + own[b])
+                and together[a, b] < MAX_EXCHANGED_RATIO * (own[a] + own[b])
                 and int(together[b].argmin()) == a
             ):
                 if fixed is positions:

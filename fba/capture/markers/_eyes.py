@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers._targets import PUPILS
+from fba.capture.markers._targets import LOWER_LIDS, PUPILS
 from fba.face.feature_points import row_of
 from fba.face.gaze import LARGEST_GAZE
 
@@ -16,12 +16,12 @@ MAX_BLINK = 0.5
 MIN_BLINK_DEPTH = 0.5
 """Smallest depth of a blink, as a share of the usual opening of the eye."""
 UPPER_LID_SHARE = 0.95
-"""Share of the opening that the upper lid sinks in a blink. The lower one comes up to meet it on four heads
+"""Share of the opening by which the upper lid sinks in a blink. The lower lid rises to meet it on four heads
 with ARKit's shapes (0.90 there, fba/capture/blendshapes/shape_faps.csv), and hardly in streams of old
 encoders; as it is not sent, a blink must nearly close the eye without it."""
 OPENING_RANGE = (0.7, 1.3)
-"""Smallest and largest opening that is accepted, relative to the usual one."""
-SMOOTHING = 0.02
+"""Smallest and largest opening that is accepted, relative to the usual opening."""
+SMOOTHING_SECONDS = 0.02
 """Length of the moving average that removes noise, in seconds."""
 DEPTH_PERCENTILE = 75
 """Percentile of the blinks' depths: while people talk, many blinks stop half-way."""
@@ -29,16 +29,13 @@ EYEBALL_RADIUS = 0.01205
 """Metres from the centre of an adult's eyeball to its front, which is nearly the same in all adults."""
 MIN_OPENING = 0.3
 """Share of its neutral opening that an eye must exceed for its pupil to be seen."""
-PUPIL_LIDS = {"3.5": ("3.1", "3.3"), "3.6": ("3.2", "3.4")}
-"""Upper and lower lid of the eye of each pupil."""
 
 
 def opening_by_blinks(sunk: Float64, times: Float64, usual: float) -> float | None:
-    """Return how far eyes are open in the neutral face, metres; None if the take has no blinks.
+    """Return the opening of the eyes in the neutral face, metres; None if the take has no blinks.
 
-    For faces of which only one lid of each eye has a marker.
-    sunk: float64 (T, E), metres that the upper lid of each eye is below its neutral place, at the times (T,).
-    usual: the opening of an eye of this face if nothing is known.
+    For faces with markers on the upper lids only. sunk: float64 (T, E), metres by which the upper lid of each
+    eye is below its neutral place, at the times (T,). usual: the opening of an eye of average proportions.
     """
     from scipy.ndimage import uniform_filter1d
     from scipy.signal import find_peaks
@@ -47,7 +44,7 @@ def opening_by_blinks(sunk: Float64, times: Float64, usual: float) -> float | No
         return None
     rate = (len(times) - 1) / float(times[-1] - times[0])
     depths: list[float] = []
-    for lid in uniform_filter1d(sunk, max(1, round(SMOOTHING * rate)), axis=0).T:
+    for lid in uniform_filter1d(sunk, max(1, round(SMOOTHING_SECONDS * rate)), axis=0).T:
         peaks, _ = find_peaks(lid, prominence=MIN_BLINK_DEPTH * usual, width=(None, MAX_BLINK * rate))
         depths += lid[peaks].tolist()
     if not depths:
@@ -57,18 +54,18 @@ def opening_by_blinks(sunk: Float64, times: Float64, usual: float) -> float | No
 
 
 def find_gaze(moved: Float64, points: Float64, places: Collection[str], size: float) -> Float64 | None:
-    """Return how far the eyes look to the left and down, float64 (T, 2), radians; None if no pupil is known.
+    """Return the turns of the eyes to the left and down, float64 (T, 2), radians; None without a pupil.
 
     moved: (T, 84, 3), displacements of feature points from the neutral face, in which eyes look ahead,
-    relative to the head, metres. points: (84, 3), the neutral face. places: those that are known. size: of
-    the face, relative to an adult's. Both eyes look the same way, as eyes do, so that their noise is halved;
-    an eye that is shut does not count, and if both are, they look as before and after.
+    relative to the head, metres. points: (84, 3), the neutral face. places: feature points with markers.
+    size: of the face, relative to an adult's. Both eyes look in the same direction, so that their noise is
+    halved; a shut eye does not count, and while both are shut, the gaze is interpolated.
     """
-    known = [name for name in PUPILS if name in places]
-    if not known:
+    pupils = [name for name in PUPILS if name in places]
+    if not pupils:
         return None
     total, weight = np.zeros((len(moved), 2)), np.zeros(len(moved))
-    for name in known:
+    for name in pupils:
         shift = moved[:, row_of()[name]] / (EYEBALL_RADIUS * size)
         most = np.sin(LARGEST_GAZE)
         pitch = -np.arcsin(np.clip(shift[:, 1], -most, most))
@@ -86,7 +83,7 @@ def find_gaze(moved: Float64, points: Float64, places: Collection[str], size: fl
 
 def _open(moved: Float64, points: Float64, pupil: str, places: Collection[str]) -> Float64:
     """Return 1 where an eye is open and 0 where it is shut, float64 (T,); 1 if its lids have no markers."""
-    upper, lower = PUPIL_LIDS[pupil]
+    upper, lower = list(LOWER_LIDS.items())[PUPILS.index(pupil)]
     if not {upper, lower} <= set(places):
         return np.ones(len(moved))
     above, below = row_of()[upper], row_of()[lower]

@@ -1,4 +1,4 @@
-"""Markers on a face to an `Animation`: FAPs, the head's turns among them, and its path as BAPs."""
+"""`from_markers`: markers on a face as FAPs, with the head's turns, and the head's path as BAPs."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from fba.animation import Animation
 from fba.arrays import Float64, Intp
 from fba.capture.markers._exchanges import Exchange, undo_exchanges
 from fba.capture.markers._eyes import find_gaze, opening_by_blinks
-from fba.capture.markers._gaps import RARELY, Filled, fill_gaps, warn_of_gaps
+from fba.capture.markers._gaps import Filled, fill_gaps, often_seen, warn_of_gaps
 from fba.capture.markers._neutral import neutral_frames
 from fba.capture.markers._registration import GIVE_MAP, Registration, complete_points, register
-from fba.capture.markers._responses import measure_responses
-from fba.capture.markers._solving import choose_unknowns, solve
+from fba.capture.markers._solving import choose_unknowns, measure_responses, solve
 from fba.capture.markers._stabilisation import follow_head, relate_poses, remove_poses
-from fba.capture.markers._targets import PUPILS, RIGID
+from fba.capture.markers._targets import LOWER_LIDS, PUPILS, RIGID
 from fba.capture.markers.marker_maps import check_map, find_map
 from fba.capture.markers.motion import MarkerMotion
 from fba.choices import Gaze
@@ -44,21 +43,18 @@ FRAME_BYTES = 6000
 """Memory, in bytes, for each frame."""
 MARKER_BYTES = 400
 """Memory, in bytes, for each marker in a frame."""
-LIDS = {"3.1": "3.3", "3.2": "3.4"}
-"""Upper lids, and the lower lid of the same eye."""
 
 
 @dataclass(frozen=True)
 class Traits:
-    """What is known of the points of a source, apart from where they are.
+    """Properties of the points of a source.
 
-    still: names of those that the head alone moves; None: their places tell. depth: whether it was measured
-    how far forward they are; otherwise no FAP in that direction is told. confused: whether points may take
-    each other's names, as optical markers do. camera: whether a head that looks along z looks into the
-    camera, and turns are counted from there; otherwise from the neutral face. untold: FAPs that they do not
-    tell. rests: name -> frames in which a point is where it is in a neutral face, for those whose frames are
-    others than those of the whole face. raised: name -> metres by which a point is above its neutral place
-    even in these frames.
+    still: names of those that the head alone moves; None if their places tell. depth: whether their depth was
+    measured; FAPs in that direction need it. confused: whether points may exchange names, as optical markers
+    do. camera: whether a head that looks along z looks into the camera, from which turns then count;
+    otherwise they count from the neutral face. untold: FAPs that the points do not show. rests: name ->
+    frames in which a point is at its neutral place, if these are not the frames of the whole face. raised:
+    name -> metres by which a point is above its neutral place even in these frames.
     """
 
     still: frozenset[str] | None = None
@@ -71,10 +67,10 @@ class Traits:
 
     def find_still(self, places: Mapping[str, str]) -> list[int]:
         """Return numbers of the points in a map, name -> place, that the head alone moves."""
-        known = self.still
+        still = self.still
         return [
             n for n, (name, place) in enumerate(places.items())
-            if (place in RIGID if known is None else name in known)
+            if (place in RIGID if still is None else name in still)
         ]  # fmt: skip
 
 
@@ -85,11 +81,11 @@ MARKERS = Traits()
 class MarkerFace:
     """A face found in a capture, and how it moves.
 
-    markers: marker -> place. found_by: how: a set's name, "shape", or "given". registration: where the face
-    is. neutral: first frame of the neutral face, and the one after its last. points: float64 (84, 3), the
-    actor's neutral feature points, metres, in the actor's axes. fapu: the actor's. filled: gaps. faps:
-    float64 (T, 68), at the capture's own times. sent: the FAPs that the markers tell. path: float64 (T, 3),
-    metres that the top of the spine moves to the left, up and to the front.
+    markers: marker -> place. found_by: source of these places: a set's name, "shape", or "given".
+    registration: where the face is. neutral: first frame of the neutral face, and the frame after its last.
+    points: float64 (84, 3), the actor's neutral feature points, metres, in the actor's axes. fapu: the
+    actor's. filled: gaps. faps: float64 (T, 68), at the capture's times. sent: the FAPs that the markers
+    show. path: float64 (T, 3), metres by which the top of the spine moves to the left, up and to the front.
     """
 
     markers: dict[str, str]
@@ -118,15 +114,15 @@ def from_markers(
 ) -> Animation:
     """Return the FAPs of a face with markers, and the path of its head as BAPs 181 to 183.
 
-    rate: frames per second; None for the capture's own, else values are interpolated at its times. markers:
+    rate: frames per second; None for the capture's; values are interpolated at the times of frames. markers:
     marker -> place on the face, see `fba.capture.markers._targets`; None to find them by names, or by the
     cloud's shape. neutral: the frames in which all FAPs are 0: "auto", "first", a frame, or (from, to) in
-    seconds. gaze: "none", or "camera": eyes turn against the head, so that they keep looking where they did.
+    seconds. gaze: "none", or "camera": eyes turn against the head, so that they keep looking at the camera.
     head_path: whether the path of the head goes into the stream, too. model: the face whose motions tell
-    FAPs apart; None for the built-in head. traits: what is known of the points if they are not markers.
+    FAPs apart; None for the built-in head. traits: of the points, if they are not markers.
 
-    FAPs are relative to the actor's own FAPU, measured on the neutral face. Lids and lips that no marker
-    tells are left to the decoder, except that the inner lips do as the outer.
+    FAPs are relative to the actor's FAPU, measured on the neutral face. Lids and lips without markers are
+    left to the decoder, except that the inner lips move as the outer.
 
     Raises ModelError where there is no face, or its motion cannot be told from the head's; OptionError;
     LimitError. Warns (FbaWarning) of everything that was repaired: units, mirrored or swapped markers, gaps.
@@ -176,16 +172,14 @@ def find_face(
     traits: Traits = MARKERS,
     limits: Limits = DEFAULT_LIMITS,
 ) -> MarkerFace:
-    """Return the face in a capture and its motion; options and errors as for `from_markers`.
-
-    traits: what is known of the points if they are not markers.
-    """
+    """Return the face in a capture and its motion; options and errors as for `from_markers`."""
     if gaze not in GAZES:
         raise OptionError(f"gaze must be one of {', '.join(GAZES)}, not {gaze!r}")
     _check_size(motion, limits)
     model = FaceModel.default() if model is None else model
     places, found_by = _find_places(motion, markers)
-    places = _without_rare(motion, places)
+    often = often_seen(tuple(places), motion.seen[:, [motion.names.index(name) for name in places]])
+    places = {name: places[name] for name in often}
     actor = _find_actor(motion, places, neutral, model, traits)
     points, moved = _measure_points(actor, motion.times, model, traits)
     try:
@@ -198,8 +192,8 @@ def find_face(
     spine = points[row_of()["7.1"]]
     path = np.einsum("tcd,d->tc", actor.rotation, spine) + actor.shift - spine
     return MarkerFace(
-        actor.places, found_by, actor.where, (actor.rest.start, actor.rest.stop), points, fapu, actor.filled,
-        values, tuple(sorted(sent)), path,
+        actor.places, found_by, actor.registration, (actor.rest.start, actor.rest.stop), points, fapu,
+        actor.filled, values, tuple(sorted(sent)), path,
     )  # fmt: skip
 
 
@@ -217,7 +211,7 @@ def _check_size(motion: MarkerMotion, limits: Limits) -> None:
 
 
 def _find_places(motion: MarkerMotion, markers: Mapping[str, str] | None) -> tuple[dict[str, str], str]:
-    """Return the places of markers, by name, and what says so. Raises OptionError for a map that is wrong."""
+    """Return marker -> place, and the source of these places. Raises OptionError for a wrong map."""
     if markers is None:
         return find_map(motion)
     places = dict(markers)
@@ -234,13 +228,13 @@ def _find_places(motion: MarkerMotion, markers: Mapping[str, str] | None) -> tup
 class _Actor:
     """Markers in the actor's axes, in metres, and the motion of the head.
 
-    places: marker -> place. where: the face in the capture. rest: frames of the neutral face. local: float64
-    (T, M, 3), the markers relative to the head, without gaps. rotation, shift: float64 (T, 3, 3) and (T, 3),
-    the head's, from the neutral face. filled: gaps.
+    places: marker -> place. registration: of the face in the capture. rest: frames of the neutral face.
+    local: float64 (T, M, 3), the markers relative to the head, without gaps. rotation, shift: float64
+    (T, 3, 3) and (T, 3), of the head from the neutral face. filled: gaps.
     """
 
     places: dict[str, str]
-    where: Registration
+    registration: Registration
     rest: slice
     local: Float64
     rotation: Float64
@@ -251,12 +245,12 @@ class _Actor:
 def _find_actor(
     motion: MarkerMotion, places: dict[str, str], neutral: Neutral, model: FaceModel, traits: Traits
 ) -> _Actor:
-    """Return the markers of a map as the actor's; those that are not where the map says are repaired."""
+    """Return the mapped markers in the actor's axes; those that are not where the map says are repaired."""
     names = tuple(places)
     positions = motion.positions[:, [motion.names.index(name) for name in names]]
     if traits.confused:
         positions, exchanges = undo_exchanges(names, positions)
-        _tell_exchanges(exchanges)
+        _warn_of_exchanges(exchanges)
     fixed = traits.find_still(places)
     if len(fixed) < 3:
         raise ModelError(
@@ -271,8 +265,8 @@ def _find_actor(
         still = np.nanmedian(positions[rest], axis=0)
     still = _complete_still(still, local, rotation[rest.start], shift[rest.start])
     where = register(names, places, still, model.points)
-    _tell(motion, where)
-    # from here on in the actor's axes and in metres
+    _warn_of_repairs(motion.unit, where)
+    # now to the actor's axes and metres
     turn = where.axes * where.factor
     mirror = np.array([-1.0 if where.mirrored else 1.0, 1.0, 1.0])
     positions = (positions * mirror) @ turn.T
@@ -320,10 +314,10 @@ def _measure_points(
 def _solve_features(
     actor: _Actor, moved: Float64, points: Float64, fapu: Fapu, model: FaceModel, traits: Traits
 ) -> tuple[Float64, tuple[int, ...]]:
-    """Return the FAPs of all frames, float64 (T, 68), and which of them the face's own markers tell."""
+    """Return the FAPs of all frames, float64 (T, 68), and those that the markers of the face show."""
     rows = row_of()
-    told = [place for place in actor.places.values() if place in rows and place not in (*RIGID, *PUPILS)]
-    unknowns = choose_unknowns(told, traits.depth, traits.untold)
+    moving = [place for place in actor.places.values() if place in rows and place not in (*RIGID, *PUPILS)]
+    unknowns = choose_unknowns(moving, traits.depth, traits.untold)
     if not unknowns.faps:
         return np.zeros((len(moved), FAP_COUNT)), ()
     values = solve(moved, points, fapu, unknowns, measure_responses(model))
@@ -331,8 +325,8 @@ def _solve_features(
 
 
 def _turn_head(values: Float64, actor: _Actor, fapu: Fapu, traits: Traits) -> tuple[int, ...]:
-    """Put the turns of the head into FAPs, float64 (T, 68); return which these are."""
-    turns = actor.where.axes.T @ actor.rotation if traits.camera else actor.rotation
+    """Put the turns of the head into FAPs, float64 (T, 68); return the numbers of these FAPs."""
+    turns = actor.registration.axes.T @ actor.rotation if traits.camera else actor.rotation
     values[:, [HEAD_PITCH - 1, HEAD_YAW - 1, HEAD_ROLL - 1]] = _head_angles(turns) / fapu.AU
     return HEAD_PITCH, HEAD_YAW, HEAD_ROLL
 
@@ -340,8 +334,8 @@ def _turn_head(values: Float64, actor: _Actor, fapu: Fapu, traits: Traits) -> tu
 def _turn_eyes(
     values: Float64, actor: _Actor, moved: Float64, points: Float64, fapu: Fapu, gaze: Gaze
 ) -> tuple[int, ...]:
-    """Put the turns of the eyes into FAPs, float64 (T, 68), which hold the head's; return which these are."""
-    eyes = find_gaze(moved, points, set(actor.places.values()), actor.where.scale)
+    """Put the turns of the eyes into FAPs (T, 68), which have the head's; return their numbers."""
+    eyes = find_gaze(moved, points, set(actor.places.values()), actor.registration.scale)
     if gaze == "camera":
         yaw, pitch = -values[:, [HEAD_YAW - 1]], -values[:, [HEAD_PITCH - 1]]
     elif eyes is not None:
@@ -350,16 +344,16 @@ def _turn_eyes(
         return ()
     values[:, [fap - 1 for fap in YAW_EYE]] = yaw
     values[:, [fap - 1 for fap in PITCH_EYE]] = pitch
-    limit_gaze(values, warn=gaze == "none")  # by the camera's gaze, a head that turns away leaves the camera
+    limit_gaze(values, warn=gaze == "none")  # a head that turns away from the camera needs no warning
     return (*YAW_EYE, *PITCH_EYE)
 
 
 def _open_by_blinks(
     points: Float64, places: Mapping[str, str], names: Sequence[str], moved: Float64, times: Float64
 ) -> None:
-    """Move lower lids without a marker to where blinks say that they are, in points, float64 (84, 3)."""
+    """Move lower lids without markers to where blinks show them, in points, float64 (84, 3)."""
     rows, placed = row_of(), {places[name]: n for n, name in enumerate(names)}
-    lids = {upper: lower for upper, lower in LIDS.items() if upper in placed and lower not in placed}
+    lids = {upper: lower for upper, lower in LOWER_LIDS.items() if upper in placed and lower not in placed}
     if not lids:
         return
     usual = np.mean([points[rows[upper], 1] - points[rows[lower], 1] for upper, lower in lids.items()])
@@ -370,22 +364,10 @@ def _open_by_blinks(
             points[rows[lower], 1] = points[rows[upper], 1] - opening
 
 
-def _without_rare(motion: MarkerMotion, places: dict[str, str]) -> dict[str, str]:
-    """Return the map without markers that are hardly ever seen; warns of them."""
-    share = motion.seen.mean(axis=0)
-    rare = [name for name in places if share[motion.names.index(name)] < RARELY]
-    if rare:
-        warnings.warn(
-            f"seen in less than {RARELY:.0%} of the frames, and left out: {list_names(rare)}",
-            FbaWarning, stacklevel=4,
-        )  # fmt: skip
-    return {name: place for name, place in places.items() if name not in rare}
-
-
 def _complete_still(still: Float64, local: Float64, rotation: Float64, shift: Float64) -> Float64:
-    """Return the neutral markers (M, 3); those missing then are where they are most of the time.
+    """Return the neutral markers (M, 3), with missing ones at their usual places.
 
-    local: (T, M, 3), relative to the head; rotation, shift: the head's in the neutral face.
+    local: (T, M, 3), relative to the head. rotation, shift: of the head in the neutral face.
     """
     usual = [np.nanmedian(path[~np.isnan(path[:, 0])], axis=0) for path in local.swapaxes(0, 1)]
     return np.where(np.isnan(still), np.array(usual) @ rotation.T + shift, still)
@@ -399,27 +381,27 @@ def _head_angles(rotation: Float64) -> Float64:
     return np.stack([pitch, yaw, roll], axis=1)
 
 
-def _tell(motion: MarkerMotion, where: Registration) -> None:
-    """Warn of what was wrong with the capture and is repaired."""
-    said = []
+def _warn_of_repairs(unit: str, where: Registration) -> None:
+    """Warn of repaired errors of the capture. unit: of the file."""
+    repairs = []
     if where.factor != 1.0:
-        stored = motion.unit or "metres"
-        said.append(
-            f"in {stored} the face would be {where.scale / where.factor:.3g} times as large as an adult's: "
+        size = where.scale / where.factor
+        repairs.append(
+            f"in {unit or 'metres'} the face would be {size:.3g} times as large as an adult's: "
             f"lengths are multiplied by {where.factor:g}"
         )
     if where.mirrored:
-        said.append("the capture is mirrored: x is turned round")
+        repairs.append("the capture is mirrored: x is turned round")
     for one, other in where.swapped:
-        said.append(f"markers {one} and {other} have each other's places: exchanged")
+        repairs.append(f"markers {one} and {other} have each other's places: exchanged")
     if where.astray:
-        said.append(f"far from their places on a face, and left out: {list_names(where.astray)}")
-    for text in said:
+        repairs.append(f"far from their places on a face, and left out: {list_names(where.astray)}")
+    for text in repairs:
         warnings.warn(text, FbaWarning, stacklevel=4)
 
 
-def _tell_exchanges(exchanges: list[Exchange]) -> None:
-    """Warn of markers that took each other's names."""
+def _warn_of_exchanges(exchanges: list[Exchange]) -> None:
+    """Warn of markers that exchanged their names."""
     if exchanges:
         first = exchanges[0]
         more = f", and {len(exchanges) - 1} more times in the take" if len(exchanges) > 1 else ""

@@ -1,4 +1,4 @@
-"""Gaps in the paths of markers: short ones by splines, long ones by neighbours."""
+"""Gaps in the paths of markers, filled by splines if they are short, else by neighbours."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.errors import FbaWarning
+from fba.name_maps import list_names
 
-SHORT = 0.2
-"""Seconds up to which a gap is filled from the marker's own path alone."""
+MAX_SPLINE_SECONDS = 0.2
+"""Longest gap, in seconds, that the path of the marker fills."""
 NEIGHBOURS = 4
-"""Markers whose motion fills a long gap, the nearest ones on the face."""
-RARELY = 0.1
-"""Share of the frames in which a marker must be seen to count."""
+"""Number of nearest markers on the face whose motion fills a longer gap."""
+MIN_SEEN_SHARE = 0.1
+"""Smallest share of the frames in which a marker must be seen."""
 
 
 @dataclass(frozen=True)
 class Filled:
-    """What was filled. short, long: gaps. longest: seconds, of marker `marker`."""
+    """Filled gaps. short, long: numbers of them. longest: the longest in seconds, of `marker`."""
 
     short: int
     long: int
@@ -28,8 +29,20 @@ class Filled:
     marker: str
 
 
+def often_seen(names: tuple[str, ...], seen: Bool) -> tuple[str, ...]:
+    """Return the markers that are seen in enough frames. Warns of others. seen: (T, M)."""
+    often = seen.mean(axis=0) >= MIN_SEEN_SHARE
+    rare = [name for name, kept in zip(names, often, strict=True) if not kept]
+    if rare:
+        warnings.warn(
+            f"seen in less than {MIN_SEEN_SHARE:.0%} of the frames, and left out: {list_names(rare)}",
+            FbaWarning, stacklevel=4,
+        )  # fmt: skip
+    return tuple(name for name in names if name not in rare)
+
+
 def find_gaps(seen: Bool) -> list[tuple[int, int]]:
-    """Return (first frame, frame after the last) of each gap: seen is bool (T,)."""
+    """Return (first frame, frame after the last) of each gap. seen: bool (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], seen, [True]]).astype(np.int8)))
     return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
 
@@ -37,9 +50,9 @@ def find_gaps(seen: Bool) -> list[tuple[int, int]]:
 def fill_gaps(names: tuple[str, ...], positions: Float64, times: Float64) -> tuple[Float64, Filled]:
     """Return positions without gaps, and what was filled.
 
-    positions: float64 (T, M, 3), relative to the head; every marker is seen at least once. A gap of up to
-    `SHORT` seconds gets a cubic through its ends, with their speeds. Over a longer one, and at both ends of
-    the take, the marker moves as its nearest neighbours do, and arrives where it is seen again.
+    positions: float64 (T, M, 3), relative to the head; every marker is seen at least once. In a gap of up to
+    `MAX_SPLINE_SECONDS`, the path is a cubic through its ends, with their speeds. In a longer gap, and at
+    both ends of the take, the marker moves as its nearest neighbours do, and arrives where it is seen again.
     """
     filled = positions.copy()
     seen = ~np.isnan(positions[..., 0])
@@ -54,24 +67,24 @@ def fill_gaps(names: tuple[str, ...], positions: Float64, times: Float64) -> tup
         length = float(times[min(end, len(times) - 1)] - times[max(start - 1, 0)])
         if length > longest:
             longest, whose = length, names[marker]
-        if inner and length <= SHORT:
+        if inner and length <= MAX_SPLINE_SECONDS:
             short += 1
             filled[start:end, marker] = _cubic(positions[:, marker], times, start, end)
         else:
             long += 1
             late.append((marker, start, end))
-    known = ~np.isnan(filled[..., 0])
+    there = ~np.isnan(filled[..., 0])
     moved = filled - rest
     for marker, start, end in late:
         near = np.argsort(np.linalg.norm(rest - rest[marker], axis=1), kind="stable")[1:].tolist()
         filled[start:end, marker] = rest[marker] + _as_neighbours(
-            moved, known, near, times, marker, start, end
+            moved, there, near, times, marker, start, end
         )
     return filled, Filled(short, long, longest, whose)
 
 
 def _cubic(path: Float64, times: Float64, start: int, end: int) -> Float64:
-    """Return the path in a gap: a cubic between the frames around it, with the speeds there."""
+    """Return the path in a gap: a cubic from the frame before to the frame after, with their speeds."""
     a, b = start - 1, end
     span = times[b] - times[a]
 
@@ -89,12 +102,12 @@ def _cubic(path: Float64, times: Float64, start: int, end: int) -> Float64:
 
 
 def _as_neighbours(
-    moved: Float64, known: Bool, near: list[int], times: Float64, marker: int, start: int, end: int
+    moved: Float64, there: Bool, near: list[int], times: Float64, marker: int, start: int, end: int
 ) -> Float64:
-    """Return how far a marker is from its rest in a gap, moving as its neighbours and meeting both ends."""
+    """Return displacements of a marker in a gap: it moves as its neighbours and meets both ends."""
     first, last = max(start - 1, 0), min(end, len(times) - 1)
     window = slice(first, last + 1)
-    chosen = [m for m in near if known[window, m].all()][:NEIGHBOURS]
+    chosen = [m for m in near if there[window, m].all()][:NEIGHBOURS]
     steps = moved[window, chosen].mean(axis=1) if chosen else np.zeros((last + 1 - first, 3))
     off = [moved[at, marker] - steps[at - first] for at in (start - 1, end) if 0 <= at < len(times)]
     if len(off) == 2:
@@ -102,11 +115,11 @@ def _as_neighbours(
         steps = steps + off[0] * (1 - share) + off[1] * share
     elif off:
         steps = steps + off[0]
-    return np.asarray(steps[start - first : end - first])
+    return steps[start - first : end - first]
 
 
 def warn_of_gaps(filled: Filled) -> None:
-    """Warn of gaps that the marker's own path does not fill."""
+    """Warn of long gaps."""
     if filled.long:
         warnings.warn(
             f"{filled.long} long gaps are filled by neighbouring markers, the longest {filled.longest:.2f} s "

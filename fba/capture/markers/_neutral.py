@@ -1,4 +1,4 @@
-"""The neutral face of a take: its start if the face is still there, else where it mostly is."""
+"""The neutral face of a take: its start if the face does not move there, else its usual shape."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import numpy as np
 from fba.arrays import Float64
 from fba.errors import OptionError
 
-WINDOW = 0.1
-"""Seconds whose median is the neutral face."""
-SLOW = 0.6
-"""Share of the usual motion within a window that a neutral start may have."""
+NEUTRAL_SECONDS = 0.1
+"""Length of the window, in seconds, whose median is the neutral face."""
+MAX_START_MOTION = 0.6
+"""Largest motion in the first window of a take with a neutral start, relative to the usual motion."""
 
 
 def neutral_frames(local: Float64, times: Float64, neutral: str | int | tuple[float, float] | slice) -> slice:
     """Return the frames of the neutral face.
 
     local: float64 (T, M, 3), markers relative to the head, NaN for gaps. neutral: "auto", "first", the number
-    of a frame, (from, to) in seconds from the start, or the frames. Raises OptionError for frames that the
-    take has not.
+    of a frame, (from, to) in seconds from the start, or the frames. Raises OptionError for frames that are
+    not in the take.
     """
     if isinstance(neutral, slice):
         return neutral
-    length = max(1, int(np.searchsorted(times - times[0], WINDOW)))
+    length = max(1, int(np.searchsorted(times - times[0], NEUTRAL_SECONDS)))
     if isinstance(neutral, tuple):
         first, last = (int(np.searchsorted(times - times[0], second)) for second in neutral)
         if not 0 <= neutral[0] < neutral[1] or first >= len(times) or last <= first:
@@ -45,10 +45,10 @@ def neutral_frames(local: Float64, times: Float64, neutral: str | int | tuple[fl
 
 
 def _find(local: Float64, length: int) -> slice:
-    """Return the start of the take if the face is still there, as takes usually begin.
+    """Return the start of the take if the face does not move there, as takes usually begin.
 
-    Else the window in which it is nearest to its rest, where each coordinate stays for most of the time: a
-    mouth that speaks and lids that blink come back to it.
+    Otherwise return the window in which the face is nearest to its rest: the value at which each coordinate
+    mostly is, to which a mouth that speaks and lids that blink return.
     """
     flat = local.reshape(len(local), -1)
     if len(flat) <= length:
@@ -57,7 +57,7 @@ def _find(local: Float64, length: int) -> slice:
     smooth = np.cumsum(np.where(np.isnan(flat), centre, flat), axis=0)
     smooth = (smooth[length:] - smooth[:-length]) / length
     speed = np.abs(smooth[length:] - smooth[:-length]).mean(axis=1) if len(smooth) > length else np.zeros(1)
-    if speed[0] <= SLOW * float(np.median(speed)):
+    if speed[0] <= MAX_START_MOTION * float(np.median(speed)):
         return slice(0, length)
     cost = _mean(np.abs(flat - centre)) + _mean(np.abs(np.diff(flat, axis=0, prepend=flat[:1])))
     best = int(_sums(cost, length).argmin())
@@ -65,10 +65,9 @@ def _find(local: Float64, length: int) -> slice:
 
 
 def _mean(values: Float64) -> Float64:
-    """Return the mean of each row over what is known, infinity where nothing is: float64 (T,)."""
-    known = ~np.isnan(values)
-    count = known.sum(axis=1)
-    total = np.where(known, values, 0.0).sum(axis=1)
+    """Return the mean of each row without NaN, infinity for rows of NaN: float64 (T,)."""
+    count = (~np.isnan(values)).sum(axis=1)
+    total = np.nansum(values, axis=1)
     return np.where(count > 0, total / np.maximum(count, 1), np.inf)
 
 

@@ -1,18 +1,19 @@
-"""Which marker is where on the face, found from the shape of the cloud alone, for names that tell nothing.
+"""Places of markers by the shape of their cloud alone, for names that say nothing.
 
-The cloud is laid onto the built-in head from many sides, by its nearest points; the best fit says where each
-marker is, and markers near a feature point get it.
+The cloud is laid onto the built-in head from many directions, by its nearest points; after the best fit,
+markers near a feature point get it.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from fba.arrays import Float64
 from fba.capture.markers._registration import GIVE_MAP, SIZE_RANGE, UNIT_FACTORS
-from fba.capture.markers._targets import HEAD, PUPILS, target_points
+from fba.capture.markers._targets import PUPILS, SKULL, target_points
 from fba.capture.markers.motion import MarkerMotion
 from fba.errors import ModelError
 from fba.face import FaceModel
@@ -23,21 +24,23 @@ MIN_MARKERS = 12
 """Smallest number of markers whose shape identifies a face."""
 DIRECTIONS = 12
 """Number of directions about the vertical from which the cloud is laid onto the head."""
-ITERATIONS = 25
-"""Number of iterations of each fit."""
+FIRST_ITERATIONS = 6
+"""Number of iterations of the fit from each direction."""
 FULL_FITS = 6
 """Number of best fits that are completed."""
+ITERATIONS = 25
+"""Number of further iterations of these."""
 MAX_POINT_DISTANCE = 0.014
 """Largest distance of a marker from its feature point, in metres."""
 MIN_PLACED = 0.4
 """Smallest share of the markers that must be near feature points."""
 MAX_ERROR = 0.006
-"""Largest root mean square distance, in metres, of a cloud that is a face's."""
-SELDOM = (*(f"2.{n}" for n in range(2, 10)), *(f"3.{n}" for n in range(7, 15)), "8.9", "8.10", "9.4", "9.5",
-          "9.6", "9.7", "9.13", "9.14", "11.4", "11.6")  # fmt: skip
-"""Points that hardly anybody marks, beside others that many do: inside the lips, corners of the eyes."""
-FRONT = -0.09
-"""Depth, metres, from which the head's surface carries markers."""
+"""Largest root mean square distance, in metres, of the cloud of a face."""
+RARE_POINTS = (*(f"2.{n}" for n in range(2, 10)), *(f"3.{n}" for n in range(7, 15)), "8.9", "8.10", "9.4",
+               "9.5", "9.6", "9.7", "9.13", "9.14", "11.4", "11.6")  # fmt: skip
+"""Points that hardly anybody marks, such as those inside the lips, beside points that many mark."""
+MIN_DEPTH = -0.09
+"""Smallest z, in metres, of the head's surface that carries markers."""
 
 
 def propose_map(motion: MarkerMotion) -> dict[str, str]:
@@ -62,7 +65,7 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
             f"(best fit {1000 * error:.0f} mm off)"
         ).with_remedies(GIVE_MAP)
     places = _skin_points(model)
-    names = [name for name in places if name not in SELDOM]
+    names = [name for name in places if name not in RARE_POINTS]
     apart = np.linalg.norm(laid[:, None] - np.array([places[name] for name in names])[None], axis=2)
     markers, targets = linear_sum_assignment(np.minimum(apart, MAX_POINT_DISTANCE))
     result = {
@@ -78,12 +81,12 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
     top = places["11.1"][1]
     for m, row in enumerate(rows):
         if motion.names[row] not in result and laid[m, 1] > top:
-            result[motion.names[row]] = HEAD
+            result[motion.names[row]] = SKULL
     return {name: result[name] for name in motion.names if name in result}
 
 
 def _skin_points(model: FaceModel) -> dict[str, Float64]:
-    """Return where markers can be on a face: each target that is on its skin."""
+    """Return target -> position (3,) of those targets that are on the skin."""
     return {name: point for name, point in target_points(model.points).items() if name not in PUPILS}
 
 
@@ -92,7 +95,7 @@ def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float
     from scipy.spatial import cKDTree
 
     skin = np.concatenate([part.vertices for part in model.of_kind("skin")]).astype(np.float64)
-    skin = skin[(skin[:, 2] > FRONT) & (skin[:, 1] > model.points[:, 1].min() - 0.02)]
+    skin = skin[(skin[:, 2] > MIN_DEPTH) & (skin[:, 1] > model.points[:, 1].min() - 0.02)]
     tree = cKDTree(skin)
     key = np.array(list(_skin_points(model).values()))
     size = float(np.sqrt(((cloud - cloud.mean(axis=0)) ** 2).sum(axis=1).mean()))
@@ -106,50 +109,31 @@ def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float
             f"spread over {size:.2g} m in no unit of length that a face has"
         ).with_remedies(GIVE_MAP)
     factor = min((1.0, *UNIT_FACTORS), key=lambda each: abs(np.log(each * size / usual)))
-    starts = []
-    for axis in _up_axes(up):
-        for turn in range(DIRECTIONS):
-            upright = _turn_up(axis)
-            starts.append(axis_matrices(1, 2 * np.pi * turn / DIRECTIONS) @ upright)
-    fits = sorted(
-        (_fit(cloud * factor, start, tree, skin, key, 6) for start in starts), key=lambda fit: fit[1]
-    )[:FULL_FITS]
-    done = [_fit(laid, np.eye(3), tree, skin, key, ITERATIONS, moved=True) for laid, _ in fits]
-    return min(done, key=lambda fit: fit[1])
+    middle = key.mean(axis=0)
+    turned = [cloud * factor @ start.T for start in _rotations(up)]
+    starts = [_fit(each - each.mean(axis=0) + middle, tree, skin, key, FIRST_ITERATIONS) for each in turned]
+    best = sorted(starts, key=lambda fit: fit[1])[:FULL_FITS]
+    return min((_fit(laid, tree, skin, key, ITERATIONS) for laid, _ in best), key=lambda fit: fit[1])
 
 
-def _up_axes(up: str) -> list[tuple[int, float]]:
-    """Return axes that may point up, and their signs."""
-    if up:
-        return [("xyz".index(up[1]), 1.0 if up[0] == "+" else -1.0)]
-    return [(1, 1.0), (2, 1.0), (0, 1.0), (1, -1.0), (2, -1.0), (0, -1.0)]
+def _rotations(up: str) -> list[Float64]:
+    """Return rotations (3, 3) from which the cloud is laid onto the head. up: axis; "" if unknown."""
+    result = []
+    for name in (up,) if up else ("+y", "+z", "+x", "-y", "-z", "-x"):
+        axis = np.eye(3)["xyz".index(name[1])] * (1.0 if name[0] == "+" else -1.0)
+        left = np.roll(np.abs(axis), 1)
+        upright = np.stack([left, axis, np.cross(left, axis)])
+        result += [axis_matrices(1, 2 * np.pi * turn / DIRECTIONS) @ upright for turn in range(DIRECTIONS)]
+    return result
 
 
-def _turn_up(axis: tuple[int, float]) -> Float64:
-    """Return the rotation that turns an axis to +y."""
-    number, sign = axis
-    vector = np.zeros(3)
-    vector[number] = sign
-    other = np.roll(np.abs(vector), 1)
-    return np.stack([other, vector, np.cross(other, vector)])
+def _fit(laid: Float64, tree: Any, skin: Float64, key: Float64, rounds: int) -> tuple[Float64, float]:
+    """Return the cloud turned, scaled and moved onto the surface, and its error, metres.
 
-
-def _fit(
-    cloud: Float64,
-    start: Float64,
-    tree: object,
-    skin: Float64,
-    key: Float64,
-    rounds: int,
-    moved: bool = False,
-) -> tuple[Float64, float]:
-    """Return the cloud turned and moved onto the surface from a start, and its error, metres."""
+    tree: a k-d tree of the vertices of the skin.
+    """
     from scipy.spatial import cKDTree
 
-    assert isinstance(tree, cKDTree)
-    laid = cloud @ start.T
-    if not moved:
-        laid = laid - laid.mean(axis=0) + key.mean(axis=0)
     size = 1.0
     for _ in range(rounds):
         distance, nearest = tree.query(laid)

@@ -1,26 +1,31 @@
 """Displacements of markers to FAPs: a least-squares solution within bounds, with the responses of a face.
 
-Each feature point is looked at along the directions of its own FAPs, and of those of the lip contour beside
-it. The jaw moves on an arc whose shape depends on the skull, so its depth is fitted to the take. It
-turns about its joint, in front of the ears, which slides forward as it does. How far the chin goes back for
-each millimetre that it sinks differs by a third between faces, and follows from where chin and ears are.
+Each feature point counts along the directions of its FAPs, and of those of the lip contour beside it. The jaw
+turns about a joint in front of the ears, which slides forward meanwhile. So the chin moves on an arc whose
+shape depends on the skull: how far it goes back for each millimetre that it sinks differs by a third between
+faces, and follows from the places of chin and ears.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.capture.markers._responses import JAW, JAW_VALUES, Responses
-from fba.face import Fapu
+from fba.face import Deformer, FaceModel, Fapu, feature_point_names
 from fba.face.authoring.regions.jaw import CHIN, EARS, Jaw, opening_angles, opening_shifts
 from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
 from fba.parameters import FAP_COUNT, faps
 
+RESPONSE_VALUE = 200.0
+"""FAP value at which a response is measured."""
+JAW = 3
+JAW_VALUES = np.array([0.0, 100, 200, 400, 600, 800, 1000, 1400])
+"""Values of open_jaw at which its curve is measured: the jaw turns, so its points move on arcs."""
 RIDGE_WEIGHT = 1e-4
 """Weight of small values, relative to that of the displacements."""
 JAW_ROUNDS = 3
@@ -28,18 +33,49 @@ JAW_ROUNDS = 3
 BOUND_ROUNDS = 8
 """Largest number of rounds in which values are fixed at a bound or released."""
 JAW_STEP = 2
-"""Row of `JAW_VALUES` that is the first guess of how far the jaw moves what."""
+"""Row of `JAW_VALUES` whose shifts are the first guess of the jaw's response."""
 BESIDE_CHIN = ("2.11", "2.12")
-"""Points without a FAP of their own, which go up, down, forward and back with the jaw."""
+"""Points without a FAP, which go up, down, forward and back with the jaw."""
 INNER_LIP = {"8.1": "2.2", "8.2": "2.3", "8.3": "2.4", "8.4": "2.5", "8.5": "2.6", "8.6": "2.7", "8.7": "2.8",
          "8.8": "2.9"}  # fmt: skip
-"""The point of the inner lip beside each of the outer lip."""
+"""Points of the outer lip, and the points of the inner lip beside them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """Shifts of feature points by FAPs, in FAPU of these FAPs, so that they hold for another face's FAPU.
+
+    each: float64 (68, 84, 3), shift for a step of each FAP; zero for FAPs that turn eyes, tongue and head.
+    jaw: float64 (J, 84, 3), shift in MNS at each of `JAW_VALUES`.
+    """
+
+    each: Float64
+    jaw: Float64
+
+
+@lru_cache(maxsize=4)
+def measure_responses(model: FaceModel) -> Responses:
+    """Return the responses of a face."""
+    deformer = Deformer(model)
+    neutral = deformer.feature_points(np.zeros(FAP_COUNT), local=True)
+    moving = [fap for fap in faps()[2:] if fap.unit not in ("AU", "")]
+    values = np.zeros((len(moving), FAP_COUNT))
+    for row, fap in enumerate(moving):
+        values[row, fap.number - 1] = RESPONSE_VALUE
+    moved = np.nan_to_num(deformer.feature_points(values, local=True) - neutral)
+    each = np.zeros((FAP_COUNT, len(feature_point_names()), 3))
+    for row, fap in enumerate(moving):
+        each[fap.number - 1] = moved[row] / (RESPONSE_VALUE * model.fapu[fap.unit])
+    opened = np.zeros((len(JAW_VALUES), FAP_COUNT))
+    opened[:, JAW - 1] = JAW_VALUES
+    jaw = np.nan_to_num(deformer.feature_points(opened, local=True) - neutral) / model.fapu.MNS
+    return Responses(each, jaw)
 
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """What is solved for. faps: the number of each; mates: FAPs that have the same value; rows: (point, axis)
-    pairs that are looked at."""
+    """The unknowns of the solution. faps: their numbers. mates: FAP -> the FAP whose value it has. rows:
+    (point, axis) of the displacements that count."""
 
     faps: tuple[int, ...]
     mates: dict[int, int]
@@ -47,10 +83,10 @@ class Unknowns:
 
 
 def choose_unknowns(points: Sequence[str], depth: bool = True, untold: Collection[int] = ()) -> Unknowns:
-    """Return which FAPs markers on these feature points tell, and along which axes.
+    """Return the FAPs that markers on these feature points show, and along which axes.
 
-    depth: whether it is known how far forward the markers are; without it, FAPs in that direction are not
-    told. untold: FAPs that are not told, either.
+    depth: whether the depth of the markers is known; FAPs in that direction need it. untold: other FAPs that
+    the markers do not show.
     """
     given = set(points)
     solved: list[int] = []
@@ -77,11 +113,11 @@ def choose_unknowns(points: Sequence[str], depth: bool = True, untold: Collectio
 
 
 def solve(moved: Float64, still: Float64, fapu: Fapu, unknowns: Unknowns, responses: Responses) -> Float64:
-    """Return FAPs, float64 (T, 68), zero where no marker tells.
+    """Return FAPs, float64 (T, 68), zero where no marker shows them.
 
-    moved: float64 (T, 84, 3), displacements of feature points from the neutral face, relative to the head,
-    in metres along the standard's axes. still, fapu: the actor's, float64 (84, 3)
-    and what is measured on these points. responses: those of any face.
+    moved: float64 (T, 84, 3), displacements of feature points from the neutral face, relative to the head, in
+    metres along the standard's axes. still: float64 (84, 3), the actor's neutral feature points. fapu: of
+    these points. responses: of any face.
     """
     points, axes = np.array(unknowns.rows).T
     seen = moved[:, points, axes]
@@ -120,7 +156,7 @@ def _solve_bounded(inverse: Float64, right: Float64, one_way: Intp) -> Float64:
     """Return the minimum of x . normal . x / 2 - right . x for each row: float64 (T, F).
 
     inverse: of the normal matrix. one_way: columns that must not be negative. A primal-dual active-set
-    method: in each round, frames with the same columns held at 0 are solved at once.
+    method: each round solves frames with the same columns held at 0 together.
     """
     free: Float64 = right @ inverse
     held = free[:, one_way] < 0

@@ -12,7 +12,7 @@ from fba.geometry import nearest_rotation, principal_axes
 PASSES = 4
 """Number of fits, each with less weight for markers that the previous one left far off."""
 MIN_SCALE = 2e-4
-"""Error, in metres, that no marker loses weight for: the noise of good cameras."""
+"""Largest error, in metres, for which no marker loses weight: the noise of good cameras."""
 SAMPLE_FRAMES = 300
 """Approximate number of frames from which the average is made."""
 MIN_SPREAD = 0.005
@@ -20,12 +20,12 @@ MIN_SPREAD = 0.005
 
 
 def fit_poses(reference: Float64, positions: Float64) -> tuple[Float64, Float64, Float64]:
-    """Return rotation (T, 3, 3) and shift (T, 3) of a rigid body in each frame, and what is left over (T, K).
+    """Return rotation (T, 3, 3) and shift (T, 3) of a rigid body in each frame, and the errors left (T, K).
 
-    reference: float64 (K, 3), where the markers are on the body. positions: float64 (T, K, 3), NaN where one
-    is missing: rotation . reference + shift comes as near to them as it can, in metres. Markers far off lose
-    their weight (Geman-McClure). Rotation and shift are NaN where fewer than three markers, or markers on a
-    line, are seen.
+    reference: float64 (K, 3), positions of the markers on the body. positions: float64 (T, K, 3), metres, NaN
+    for missing markers: rotation . reference + shift comes as near to them as it can. Markers far off lose
+    their weight (Geman-McClure). All results are NaN where fewer than three markers, or markers on a line,
+    are seen.
     """
     seen: Bool = ~np.isnan(positions[..., 0]) & ~np.isnan(reference[:, 0])
     known = np.where(seen[..., None], positions, 0.0)
@@ -52,9 +52,9 @@ def fit_poses(reference: Float64, positions: Float64) -> tuple[Float64, Float64,
 
 
 def refine_reference(reference: Float64, positions: Float64) -> Float64:
-    """Return where markers are on the body on average: float64 (K, 3).
+    """Return the average positions of markers on the body: float64 (K, 3).
 
-    reference: a first guess, such as the markers of one frame; a missing one is filled in.
+    reference: a first guess, such as the markers of a frame; missing markers are filled in.
     """
     positions = positions[:: max(1, len(positions) // SAMPLE_FRAMES)]
     for _ in range(2):
@@ -67,7 +67,7 @@ def refine_reference(reference: Float64, positions: Float64) -> Float64:
 
 
 def follow_head(fixed: Float64, times: Float64) -> tuple[Float64, Float64]:
-    """Return the head's rotation (T, 3, 3) and shift (T, 3) from markers that only it moves: (T, K, 3)."""
+    """Return the head's rotation (T, 3, 3) and shift (T, 3) from markers (T, K, 3) that only it moves."""
     seen = ~np.isnan(fixed[..., 0])
     first = int(seen.sum(axis=1).argmax())
     reference = refine_reference(fixed[first].copy(), fixed)
@@ -81,7 +81,7 @@ def follow_head(fixed: Float64, times: Float64) -> tuple[Float64, Float64]:
 
 
 def fill_poses(rotation: Float64, shift: Float64, times: Float64) -> tuple[Float64, Float64]:
-    """Return poses with those that are NaN interpolated in time; at both ends, held."""
+    """Return poses with NaN interpolated in time; at both ends they stay."""
     known = np.flatnonzero(~np.isnan(shift[:, 0]))
     if len(known) == len(shift):
         return rotation, shift
@@ -95,7 +95,7 @@ def fill_poses(rotation: Float64, shift: Float64, times: Float64) -> tuple[Float
 
 
 def relate_poses(rotation: Float64, shift: Float64, rest: slice) -> tuple[Float64, Float64]:
-    """Return poses relative to that of the neutral face, the mean over its frames."""
+    """Return poses relative to the mean over the frames of the neutral face."""
     base = nearest_rotation(rotation[rest].sum(axis=0))
     centre = shift[rest].mean(axis=0)
     turned = rotation @ base.T
@@ -121,10 +121,8 @@ def _can_turn(body: Float64, seen: Bool) -> Bool:
 
 
 def _has_spread(points: Float64) -> bool:
-    """Whether there are three points at least that are not on a line."""
-    if len(points) < 3:
-        return False
-    return bool(principal_axes(points)[1][1] > MIN_SPREAD)
+    """Whether there are at least three points that are not on a line."""
+    return len(points) >= 3 and bool(principal_axes(points)[1][1] > MIN_SPREAD)
 
 
 def _median(values: Float64, seen: Bool) -> Float64:

@@ -1,20 +1,20 @@
-"""Maps from markers to places on the face: found, corrected by hand, in TOML files."""
+"""Maps from markers to places on the face: to find, to change, and to keep in TOML files."""
 
 from __future__ import annotations
 
-import csv
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib.resources import files
+from typing import Any
 
-from fba.capture.markers._targets import HEAD, RIGID, TARGETS
+from fba.capture.markers._targets import RIGID, SKULL, TARGETS
 from fba.capture.markers.motion import MarkerMotion
-from fba.errors import FormatError, OptionError, did_you_mean
+from fba.errors import FbaWarning, FormatError, ModelError, OptionError, did_you_mean
 from fba.face.feature_points import row_of
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.name_maps import change_known_names, read_names, write_names
-from fba.source import Path
+from fba.name_maps import change_known_names, read_names, simplify, write_names
+from fba.source import Path, read_table
 
 TABLE = "markers"
 MIN_NAMES = 8
@@ -27,21 +27,15 @@ MIN_SHARE = 0.6
 def marker_sets() -> dict[str, dict[str, str]]:
     """Return the built-in sets: name of the set -> simplified marker name -> target, "" for none."""
     result: dict[str, dict[str, str]] = {}
-    text = (files(__package__) / "marker_sets.csv").read_text(encoding="utf-8")
-    for row in csv.DictReader(text.splitlines()):
+    for row in read_table(__package__, "marker_sets.csv"):
         result.setdefault(row["set"], {})[simplify(row["marker"])] = row["target"]
     return result
 
 
-def simplify(name: str) -> str:
-    """Return a name in lower case, letters and digits only, without a subject: "Anna:LPT_1" -> "lpt1"."""
-    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
-
-
 def match_names(names: Sequence[str]) -> tuple[str, dict[str, str]]:
-    """Return the set whose names fit, and marker -> target; ("", {}) if none does.
+    """Return the set whose names fit, and marker -> target; ("", {}) if no set fits.
 
-    Names that are feature points ("2.1", "FDP_2.1", "fp8_3"), "head" or a tragion mean these.
+    Markers may also be named after feature points ("2.1", "FDP_2.1", "fp8_3"), "head" or a tragion.
     """
     direct = {name: target for name in names if (target := _named_point(name))}
     if len(direct) >= MIN_NAMES:
@@ -57,7 +51,7 @@ def match_names(names: Sequence[str]) -> tuple[str, dict[str, str]]:
 
 
 def _named_point(name: str) -> str:
-    """Return the target that a marker's name says, "" if it says none."""
+    """Return the target that a marker is named after, or ""."""
     word = name.rpartition(":")[2].strip().lower()
     if word in TARGETS:
         return word
@@ -67,9 +61,9 @@ def _named_point(name: str) -> str:
 
 
 def find_map(motion: MarkerMotion) -> tuple[dict[str, str], str]:
-    """Return marker -> target of a capture, and how it was found: a set's name, or "shape".
+    """Return marker -> target of a capture, and the source of the map: a set's name, or "shape".
 
-    Where names tell nothing, the shape of the cloud does. ModelError if it is not that of a face.
+    If the names fit no set, the shape of the cloud decides. ModelError if it is not that of a face.
     """
     family, found = match_names(motion.names)
     if found:
@@ -82,14 +76,14 @@ def find_map(motion: MarkerMotion) -> tuple[dict[str, str], str]:
 def change_map(
     motion: MarkerMotion, base: Mapping[str, str] | None, pairs: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return a map with some markers given by hand.
+    """Return a map in which some markers are changed by hand.
 
-    base: the map that is changed, None for what is found. pairs: marker -> target, or "" to leave it out.
-    Another marker that had the same feature point loses it. OptionError for an unknown marker or target.
+    base: the map before; None for that of `find_map`. pairs: marker -> target, or "" to leave it out. Another
+    marker that had the same feature point loses it. OptionError for an unknown marker or target.
     """
     return change_known_names(
         find_map(motion)[0] if base is None else base,
-        pairs, motion.names, "the capture has no marker", check_target, shared=HEAD,
+        pairs, motion.names, "the capture has no marker", check_target, shared=SKULL,
     )  # fmt: skip
 
 
@@ -123,17 +117,17 @@ def write_map(path: Path, markers: Mapping[str, str], motion: MarkerMotion | Non
 
 
 def check_map(markers: Mapping[str, str]) -> None:
-    """Raise OptionError where two markers are at one place that is no more than a point."""
+    """Raise OptionError where two markers are at the same point."""
     taken: dict[str, str] = {}
     for marker, target in markers.items():
         check_target(target)
-        if target != HEAD and target in taken:
+        if target != SKULL and target in taken:
             raise OptionError(f"{taken[target]!r} and {marker!r} are both at {target}")
         taken[target] = marker
 
 
 def check_target(target: str) -> None:
-    """Raise OptionError for a target that markers cannot have."""
+    """Raise OptionError for a place where markers cannot be."""
     if target in TARGETS:
         return
     if target in row_of():
@@ -145,3 +139,21 @@ def check_target(target: str) -> None:
         f"there is no place {target!r}{did_you_mean(target, TARGETS)}; a marker is at a feature point of the "
         f"face, such as 2.1 or 8.3, or at {', '.join(special)}"
     )
+
+
+def summarise(motion: MarkerMotion) -> dict[str, Any]:
+    """Return the description of a capture, and in "map" and "placed" what of it is on a face.
+
+    map: source of the places on the face, a set's name or "shape"; "" if there is no face. placed: number of
+    markers with a place.
+    """
+    placed: dict[str, str] = {}
+    found_by = ""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)
+            if len(motion):
+                placed, found_by = find_map(motion)
+    except ModelError:
+        pass
+    return {**motion.describe(), "map": found_by, "placed": len(placed)}

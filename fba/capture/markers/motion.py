@@ -11,12 +11,12 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.capture.markers._gaps import find_gaps
 from fba.errors import ModelError
+from fba.tracks import freeze
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "dm": 0.1, "in": 0.0254, "ft": 0.3048}
 """Units of length, in metres."""
 MAX_MARKERS = 2000
-"""Largest number of markers; more are damage. Captures of faces have a few hundred, those of crowds a
-thousand."""
+"""Largest number of markers; more are damage. Captures of faces have hundreds, those of crowds a thousand."""
 MAX_COORDINATE = 1e6
 """Largest coordinate, metres; more is damage."""
 
@@ -58,7 +58,7 @@ class MarkerMotion:
         if len(set(self.names)) != count:
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise ModelError(f"two markers are called {twice!r}")
-        object.__setattr__(self, "rate", Fraction(self.rate))
+        freeze(self, rate=Fraction(self.rate))
         if self.rate <= 0:
             raise ModelError(f"the frame rate must be positive, not {self.rate}")
         if not np.isfinite(times).all():
@@ -78,9 +78,7 @@ class MarkerMotion:
             raise ModelError(
                 f"marker {self.names[marker]!r} is at {positions[frame, marker, axis]:g} m in frame {frame}"
             )
-        for what, array in (("positions", positions), ("times", times)):
-            array.flags.writeable = False
-            object.__setattr__(self, what, array)
+        freeze(self, positions=positions, times=times)
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -88,8 +86,8 @@ class MarkerMotion:
     def describe(self) -> dict[str, Any]:
         """Return what is in the capture, for `fba info`: plain numbers, texts and lists of them.
 
-        markers: names. frames, rate, seconds, start. unit, up: as the file says, "" if it does not. gaps: how
-        many; missing: share of all positions; longest: seconds of the longest gap, and its marker.
+        unit, up: "" where the file has none. gaps: their number. missing: share of all positions. longest:
+        seconds of the longest gap.
         """
         seen = self.seen
         gaps = [

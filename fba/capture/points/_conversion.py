@@ -13,7 +13,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
 from fba.capture.markers._faces import MarkerFace, Traits, find_face, from_markers
 from fba.capture.markers._stabilisation import fit_poses, refine_reference
-from fba.capture.markers._targets import HEAD, target_points
+from fba.capture.markers._targets import SKULL, target_points
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.points._lifting import lift
 from fba.capture.points._neutral import find_rests
@@ -34,9 +34,9 @@ from fba.limits import DEFAULT_LIMITS, Limits
 
 Neutral = str | int | tuple[float, float]
 GUESSED_DEPTH_FAPS = frozenset({14})
-"""FAPs that a depth guessed by a tracker does not show: the jaw's thrust is lost in the chin's arc."""
+"""FAPs that need a measured depth: where a tracker guesses it, the jaw's thrust is lost in the chin's arc."""
 MAX_MISFIT = 0.02
-"""Largest median distance, in metres, of the points from a known face; those of real faces are 5 mm off."""
+"""Largest median distance, in metres, of the points of a face from a known face. Real faces are 5 mm off."""
 SAMPLE_FRAMES = 60
 """Approximate number of frames that are tested for being a face."""
 POINT_BYTES = 400
@@ -44,7 +44,7 @@ POINT_BYTES = 400
 SIZE_ROUNDS = 2
 """Number of fits of the size, each with the rotations of the previous one."""
 MEDIAN_REACH = 1
-"""Number of frames before and behind whose median is the size: heads approach slowly, trackers tremble."""
+"""Number of frames before and after whose median is the size: heads approach slowly, trackers tremble."""
 
 
 def from_points(
@@ -61,13 +61,13 @@ def from_points(
 ) -> Animation:
     """Return the FAPs of a face whose points a tracker found, and for points in metres its path as BAPs.
 
-    markers: points -> place on the face, such as {"37+38": "3.2"}; None for the tracker's own, which
-    `fba.capture.points.places.point_places` returns. aspect: of the picture, width / height, for points that
-    are shares of it; None for the motion's own, or what makes the points a face. The other options, and what
-    is done once pose and size are removed, are those of `fba.capture.from_markers`; pupils, where there are
-    any, turn the eyes.
+    markers: points -> place on the face, such as {"37+38": "3.2"}; None for those of the tracker, see
+    `fba.capture.points.places.point_places`. aspect: of the picture, width / height, for points that are
+    shares of it; None for that of the motion, or the aspect with which the points are most like a face. The
+    other options are those of `fba.capture.from_markers`, which makes the FAPs once pose and size are
+    removed. Pupils turn the eyes.
 
-    Points without depth do not tell FAPs 14, 16 and 17, nor 27 and 28, and none is made up. Raises ModelError
+    Points without depth do not show FAPs 14, 16, 17, 27 and 28, which are not sent then. Raises ModelError
     where there is no face; OptionError; LimitError. Warns (FbaWarning) of everything that was repaired.
     """
     made = prepare(motion, markers=markers, neutral=neutral, aspect=aspect, model=model, limits=limits)
@@ -97,7 +97,7 @@ def find_point_face(
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Points as if they were markers: in metres, of one size, in every frame; and what is known of them."""
+    """Points as if they were markers: in metres, of constant size, in every frame; and their traits."""
 
     markers: MarkerMotion
     places: dict[str, str]
@@ -118,13 +118,13 @@ def prepare(
     model = FaceModel.default() if model is None else model
     places = dict(point_places(motion.count) if markers is None else markers)
     check_places(places, motion.count)
-    if motion.flat:  # a point somewhere on the head has a depth that nobody knows
-        places = {name: place for name, place in places.items() if place != HEAD}
+    if motion.flat:  # the depth of a point somewhere on the head is unknown
+        places = {name: place for name, place in places.items() if place != SKULL}
     still = find_still(places, motion.count)
     seen = motion.seen
     if not seen.any():
         raise ModelError(f"no face is seen in any of the {len(motion)} frames; there is nothing to encode")
-    _tell_unseen(motion)
+    _warn_of_unseen(motion)
     limits.check_bytes(POINT_BYTES * len(motion) * len(places), "the capture", source=motion.positions.nbytes)
     points = take_points(motion.positions[seen], tuple(places))
     common: Bool = np.asarray(np.isfinite(points[..., 0]).any(axis=0))
@@ -145,13 +145,13 @@ def prepare(
     raised: dict[str, float] = {}
     rest: Neutral | slice = neutral
     if neutral == "auto":
-        found = find_rests(points, places, template, motion.times[seen])
-        if found is not None:
-            rows = np.flatnonzero(seen)
-            rest = slice(int(rows[found.whole.start]), int(rows[found.whole.stop - 1]) + 1)
-            rests = {name: rows[found.parts[place]] for name, place in places.items() if place in found.parts}
+        neutral_face = find_rests(points, places, template, motion.times[seen])
+        if neutral_face is not None:
+            rows, whole, parts = np.flatnonzero(seen), neutral_face.whole, neutral_face.parts
+            rest = slice(int(rows[whole.start]), int(rows[whole.stop - 1]) + 1)
+            rests = {name: rows[parts[place]] for name, place in places.items() if place in parts}
             brows = [name for name, place in places.items() if place.startswith("4.")]
-            raised = dict.fromkeys(brows, found.raised) if found.raised else {}
+            raised = dict.fromkeys(brows, neutral_face.raised) if neutral_face.raised else {}
     elif isinstance(neutral, int) and 0 <= neutral < len(seen) and not seen[neutral]:
         raise OptionError(f"neutral: frame {neutral} has no face")
     points = _bridge(points, motion, limits)
@@ -183,7 +183,7 @@ def _check_face(points: Float64, template: Float64) -> None:
 
 
 def _bridge(points: Float64, motion: PointMotion, limits: Limits) -> Float64:
-    """Return points (T, M, 3) of all frames, of those (S, M, 3) in which a face is seen."""
+    """Return points (T, M, 3) of all frames from those (S, M, 3) of the frames with a face."""
     seen = motion.seen
     if seen.all():
         return points
@@ -195,13 +195,13 @@ def _bridge(points: Float64, motion: PointMotion, limits: Limits) -> Float64:
 
 
 def _template(places: Mapping[str, str], model: FaceModel) -> Float64:
-    """Return where points are on a known face: float64 (M, 3); NaN for those somewhere on the head."""
-    known = target_points(model.points)
-    nowhere = np.full(3, np.nan)
-    return np.array([nowhere if place == HEAD else known[place] for place in places.values()])
+    """Return positions (M, 3) of points on a known face; NaN for those somewhere on the head."""
+    targets = target_points(model.points)
+    unknown = np.full(3, np.nan)
+    return np.array([unknown if place == SKULL else targets[place] for place in places.values()])
 
 
-def _tell_unseen(motion: PointMotion) -> None:
+def _warn_of_unseen(motion: PointMotion) -> None:
     """Warn of frames without a face."""
     seen = motion.seen
     if seen.all():
@@ -214,12 +214,12 @@ def _tell_unseen(motion: PointMotion) -> None:
 
 
 def _even_sizes(points: Float64, template: Float64, still: list[int]) -> Float64:
-    """Return points of one size, metres, as large as an adult's face.
+    """Return points of constant size, metres, as large as an adult's face.
 
-    Points in units of a picture are larger where the head comes nearer.
+    In units of a picture, points lie farther apart when the head comes nearer.
 
-    points: float64 (T, M, 3), in one unit within each frame. template: (M, 3), where they are on an adult's
-    face, NaN where unknown. still: numbers of those that the face does not move.
+    points: float64 (T, M, 3), in the same unit along all axes of a frame. template: (M, 3), the points on an
+    adult's face, NaN where unknown. still: numbers of those that the face does not move.
     """
     fixed = points[:, still]
     middle = np.nanmean(fixed, axis=1, keepdims=True)
@@ -248,7 +248,7 @@ def _adult_size(points: Float64, template: Float64) -> float:
 
 
 def _size_ratios(reference: Float64, even: Float64, rotation: Float64, weights: Float64) -> Float64:
-    """Return the ratio of each frame's size to the reference's: float64 (T,), NaN where nothing is seen."""
+    """Return the ratio of each frame's size to the reference's: float64 (T,), NaN without points."""
     known = np.nan_to_num(even)
     total = np.maximum(weights.sum(axis=1), 1e-12)[:, None]
     own = (weights @ reference) / total
@@ -260,8 +260,8 @@ def _size_ratios(reference: Float64, even: Float64, rotation: Float64, weights: 
 
 
 def _smooth_sizes(sizes: Float64) -> Float64:
-    """Return the moving median of sizes (T,), NaN where they are."""
+    """Return the moving median of sizes (T,); NaN stays."""
     padded = np.pad(sizes, MEDIAN_REACH, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * MEDIAN_REACH + 1)
     steady = np.nanmedian(windows, axis=1)
-    return np.asarray(np.where(np.isnan(sizes), np.nan, steady))
+    return np.where(np.isnan(sizes), np.nan, steady)

@@ -1,9 +1,9 @@
-"""Points of a picture without depth, given that of a face: a head that turns shows how deep each one is.
+"""The depth of points in a picture: a head that turns shows the depth of each point.
 
-A face is known in shape, roughly, and in what it can do: its feature points are those of another face, moved
-by smooth errors, and its FAPs move them. Of the shape, the poses and the motion, each is found from the
-others. A point that FAPs hardly move sideways, as the middle of the lips, tells its depth by each turn of the
-head; the corners of the mouth, which a smile moves, too, tell theirs by its neighbours.
+The shape of a face is known roughly, and so is its motion: its feature points are those of another face,
+moved by smooth errors, and its FAPs move them. Shape, poses and motion are each computed from the others. A
+point that FAPs hardly move sideways, such as the middle of the lips, shows its depth when the head turns. A
+smile moves the corners of the mouth as well, so that their depth follows from their neighbours.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers._responses import measure_responses
+from fba.capture.markers._solving import measure_responses
 from fba.capture.markers._targets import PUPILS, RIGID
 from fba.capture.points.poses import Poses, fit_poses
 from fba.errors import ModelError
@@ -31,13 +31,13 @@ SAMPLE_FRAMES = 60
 USUAL_FAPS = {"MNS": 150.0, "MW": 100.0, "ENS": 120.0, "ES": 60.0, "IRISD": 400.0}
 """Usual size of FAPs of each unit, root mean square, in thousandths of the unit."""
 GAZE_SHIFT = (0.004, 0.003)
-"""Metres by which eyes move their pupils sideways, and up and down."""
+"""Usual shifts of pupils by the gaze, in metres: sideways, and up and down."""
 NOISE = 4e-4
 """Error of trackers, in metres."""
 FACE_DIFFERENCE = np.array([0.005, 0.005, 0.004])
-"""Distance of points between faces of one size, in metres: sideways, up and in depth."""
+"""Distance of points between faces of the same size, in metres: sideways, up and in depth."""
 CORRELATION_LENGTH = 0.015
-"""Distance, in metres, over which such differences are alike."""
+"""Distance, in metres, over which such differences are correlated."""
 POINT_DIFFERENCE = 0.0015
 """Distance, in metres, by which single points differ from those around them."""
 INDEPENDENT_RATE = 2.0
@@ -46,10 +46,10 @@ INDEPENDENT_RATE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """What is known of a face before it is seen.
+    """Prior knowledge of a face.
 
-    template: float64 (M, 3), its points on another face. shape: float64 (3M, 3M), inverse covariance of how
-    far they are from there; motion: float64 (3M, 3M), covariance of how far FAPs move them.
+    template: float64 (M, 3), its points on another face. shape: float64 (3M, 3M), inverse covariance of the
+    differences from there. motion: float64 (3M, 3M), covariance of the displacements by FAPs.
     """
 
     template: Float64
@@ -66,8 +66,8 @@ def lift(
 ) -> Float64:
     """Return points (T, M, 2) with depth: float64 (T, M, 3), metres, as large as an adult's face.
 
-    x to the right, y up, z towards the camera. places: of each point. template: (M, 3), where points are on
-    the model's face. times: (T,), seconds. Raises ModelError where too few points tell a pose.
+    x to the right, y up, z towards the camera. places: of each point. template: (M, 3), the points on the
+    model's face. times: (T,), seconds. Raises ModelError where too few points show the pose.
     """
     known = _know(list(places.values()), template, model)
     spread = np.sqrt(np.diag(known.motion).reshape(-1, 3).sum(axis=1))
@@ -90,7 +90,7 @@ def lift(
 
 
 def _know(places: list[str], template: Float64, model: FaceModel) -> Knowledge:
-    """Return what is known of a face whose points are at these places."""
+    """Return the knowledge of a face whose points are at these places."""
     rows = [row_of().get(place) for place in places]
     each = measure_responses(model).each
     moves = np.zeros((len(each), len(places), 3))
@@ -112,11 +112,12 @@ def _know(places: list[str], template: Float64, model: FaceModel) -> Knowledge:
 
 def _seen(points: Float64, poses: Poses) -> Float64:
     """Return points (T, M, 2) in metres across the head's middle."""
-    return np.asarray((points - poses.shift[:, None]) / poses.scale[:, None, None])
+    return (points - poses.shift[:, None]) / poses.scale[:, None, None]
 
 
 def _inverse(poses: Poses, known: Knowledge) -> tuple[Float64, Float64]:
-    """Return how motion shows in pictures, (T, 3M, 2M), and the inverse covariance of these, (T, 2M, 2M)."""
+    """Return the covariance of motion in space and in pictures, (T, 3M, 2M), and the inverse of that in
+    pictures, (T, 2M, 2M)."""
     count = len(known.template)
     rows = poses.rotation[:, :2]
     shows = known.motion.reshape(-1, 3) @ rows.swapaxes(1, 2)
@@ -129,11 +130,11 @@ def _project(vectors: Float64, rows: Float64) -> Float64:
     """Return (T, 3M, K), directions in space, as they are seen: (T, 2M, K). rows: (T, 2, 3)."""
     frames, _, width = vectors.shape
     seen = rows[:, None] @ vectors.reshape(frames, -1, 3, width)
-    return np.asarray(seen.reshape(frames, -1, width))
+    return seen.reshape(frames, -1, width)
 
 
 def _refine(shape: Float64, points: Float64, poses: Poses, known: Knowledge, share: float) -> Float64:
-    """Return the shape (M, 3) that is likeliest, given poses in some frames. share: of them that are new."""
+    """Return the likeliest shape (M, 3) for poses in some frames. share: of frames with new information."""
     count = len(shape)
     rows = poses.rotation[:, :2]
     off = (_seen(points, poses) - np.einsum("tac,nc->tna", rows, shape)).reshape(len(rows), -1)
@@ -145,11 +146,11 @@ def _refine(shape: Float64, points: Float64, poses: Poses, known: Knowledge, sha
     right = np.einsum("tac,tna->nc", rows, pull).ravel()
     right = share * right + known.shape @ (known.template - shape).ravel()
     change = np.linalg.solve(share * normal + known.shape, right)
-    return np.asarray(shape + change.reshape(count, 3))
+    return shape + change.reshape(count, 3)
 
 
 def _in_head(points: Float64, shape: Float64, poses: Poses, known: Knowledge) -> Float64:
-    """Return points (T, M, 3) in the head's axes, as deep as the shape, (M, 3), and its motion say."""
+    """Return points (T, M, 3) in the head's axes, with the depth of the shape (M, 3) and its motion."""
     rows = poses.rotation[:, :2]
     seen = _seen(points, poses)
     off = (seen - np.einsum("tac,nc->tna", rows, shape)).reshape(len(rows), -1)

@@ -11,15 +11,16 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.capture.sampling import find_gaps
 from fba.errors import ModelError
+from fba.tracks import freeze
 
 COUNTS = (68, 70, 468, 478)
-"""Points of the trackers that are known: iBUG's 68 (dlib, OpenFace, 300-W), OpenPose's 70, MediaPipe's."""
-OTHERS = {
+"""Numbers of points of known trackers: iBUG's 68 (dlib, OpenFace, 300-W), OpenPose's 70, MediaPipe's."""
+OTHER_TRACKERS = {
     5: "RetinaFace and MTCNN", 17: "one half of a face's outline", 21: "AFLW", 29: "COFW", 49: "SDM",
     51: "iBUG's 68 without the outline", 66: "IntraFace and CLM", 98: "WFLW", 106: "JD-landmark, InsightFace",
     194: "HELEN", 543: "MediaPipe Holistic, a face of which is 468", 553: "MediaPipe Holistic",
 }  # fmt: skip
-"""Who else marks a face with how many points."""
+"""Other numbers of points on a face, and who uses them."""
 MAX_COORDINATE = 1e7
 """Largest coordinate; more is damage."""
 
@@ -28,14 +29,14 @@ MAX_COORDINATE = 1e7
 class PointMotion:
     """Tracked points at the source's own times.
 
-    positions: float64 (T, N, 2) or (T, N, 3), NaN where no face was seen. x goes to the right in the picture,
-    y down, z away from the camera. N is one of `COUNTS`, which says what each point is. metric: whether
-    positions are metres in the camera's axes; otherwise they are in units of the picture. share: whether x is
-    a share of the picture's width (z, too) and y one of its height, whose ratio is `aspect`, width / height;
-    None where unknown. times: float64 (T,), seconds, increasing. rate: nominal frames per second. eyes:
-    float64 (T, 4), radians, as FAPs 23 to 26, or None. start: time of day of the
-    first row, in seconds; None where unknown. name: of the performance. findings: what a reader
-    repaired or found odd, a sentence each.
+    positions: float64 (T, N, 2) or (T, N, 3), NaN where no face was seen. x points to the right in the
+    picture, y down, z away from the camera. N, which must be in `COUNTS`, says what each point is. metric:
+    whether positions are metres in the camera's axes; otherwise they are in units of the picture. share:
+    whether x and z are shares of the picture's width and y of its height, whose ratio is `aspect`, width /
+    height; None where unknown. times: float64 (T,), seconds, increasing. rate: nominal frames per second.
+    eyes: float64 (T, 4), radians, as FAPs 23 to 26, or None. start: time of day of the first row, in seconds;
+    None where unknown. name: of the performance. findings: what a reader repaired or found odd, a sentence
+    each.
 
     Arrays are read-only copies. Raises ModelError if the parts contradict each other.
     """
@@ -60,7 +61,7 @@ class PointMotion:
                 f"{times.shape}"
             )
         check_count(positions.shape[1])
-        object.__setattr__(self, "rate", Fraction(self.rate))
+        freeze(self, rate=Fraction(self.rate))
         if self.rate <= 0:
             raise ModelError(f"PointMotion: the rate must be positive, not {self.rate}")
         if len(times) and not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
@@ -74,17 +75,14 @@ class PointMotion:
         eyes = None if self.eyes is None else np.array(self.eyes, dtype=np.float64)
         if eyes is not None and eyes.shape != (len(times), 4):
             raise ModelError(f"PointMotion: eyes have shape {eyes.shape}, not ({len(times)}, 4)")
-        for what, array in (("positions", positions), ("times", times), ("eyes", eyes)):
-            if array is not None:
-                array.flags.writeable = False
-            object.__setattr__(self, what, array)
+        freeze(self, positions=positions, times=times, eyes=eyes)
 
     def __len__(self) -> int:
         return len(self.times)
 
     @property
     def count(self) -> int:
-        """How many points a frame has."""
+        """Number of points in a frame."""
         return int(self.positions.shape[1])
 
     @property
@@ -96,7 +94,7 @@ class PointMotion:
     def seen(self) -> Bool:
         """Frames (T,) in which a face was seen: more than half of its points are there."""
         share: Float64 = np.isnan(self.positions[..., 0]).mean(axis=1)
-        return np.asarray(share < 0.5)
+        return share < 0.5
 
     def describe(self) -> dict[str, Any]:
         """Return what is in the capture, for `fba info`: plain numbers, texts and lists of them."""
@@ -121,7 +119,7 @@ def check_count(count: int) -> None:
     """Raise ModelError for a number of points that no known tracker finds."""
     if count in COUNTS:
         return
-    whose = f", as those of {OTHERS[count]}" if count in OTHERS else ""
+    whose = f", as those of {OTHER_TRACKERS[count]}" if count in OTHER_TRACKERS else ""
     known = ", ".join(map(str, COUNTS[:-1]))
     raise ModelError(
         f"{count} points on a face{whose}: nobody says here what each of them is; sets of {known} and "

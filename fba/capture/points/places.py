@@ -1,24 +1,22 @@
-"""Where on a face the points of a tracker are: a table, corrected by hand, in TOML files.
+"""Places on a face of a tracker's points: a table, changes by hand, and TOML files.
 
-A place is told by one point, "152", or by the middle of several, "37+38".
+A point, "152", or the middle of several, "37+38", is at a place.
 """
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers._targets import HEAD, RIGID
+from fba.capture.markers._targets import RIGID, SKULL
 from fba.capture.markers.marker_maps import check_map, check_target
 from fba.errors import OptionError
 from fba.name_maps import change_names, write_names
-from fba.source import Path
+from fba.source import Path, read_table
 
 PARTS = {68: (68,), 70: (68, 70), 468: (468,), 478: (468, 478)}
 """Rows of the table that count for each number of points."""
@@ -30,42 +28,30 @@ TABLE = "markers"
 @cache
 def point_places(count: int) -> dict[str, str]:
     """Return points -> place on the face, for a tracker with this number of points."""
-    return {row["points"]: row["place"] for row in _rows() if int(row["tracker"]) in PARTS[count]}
+    return {row["points"]: row["place"] for row in _rows(count)}
 
 
 @cache
-def still_points(count: int) -> frozenset[str]:
-    """Return the points that the head alone moves."""
-    return frozenset(row["points"] for row in _rows() if int(row["tracker"]) in PARTS[count] and row["still"])
+def _rows(count: int) -> list[dict[str, str]]:
+    rows = read_table(__package__, "point_places.csv")
+    return [row for row in rows if int(row["tracker"]) in PARTS[count]]
 
 
 def find_still(places: Mapping[str, str], count: int) -> frozenset[str]:
-    """Return which points of a map the head alone moves: those of the table, and those at still places."""
-    known = {place for points, place in point_places(count).items() if points in still_points(count)}
-    still = (known | set(RIGID)) - {HEAD}
-    return frozenset(points for points, place in places.items() if place in still or place == HEAD)
-
-
-@cache
-def _rows() -> tuple[dict[str, str], ...]:
-    text = (files(__package__) / "point_places.csv").read_text(encoding="utf-8")
-    return tuple(csv.DictReader(text.splitlines()))
+    """Return the points of a map that the head alone moves, by their places."""
+    still = {*RIGID, *(row["place"] for row in _rows(count) if row["still"])}
+    return frozenset(points for points, place in places.items() if place in still)
 
 
 def check_places(places: Mapping[str, str], count: int) -> None:
-    """Raise OptionError for points that a tracker has not, and for places that markers cannot have."""
+    """Raise OptionError for points that a tracker lacks, and for places where markers cannot be."""
     check_map(dict(places))
     for points in places:
-        check_points(points, count)
-
-
-def check_points(points: str, count: int) -> None:
-    """Raise OptionError for points that a tracker with this number of points lacks."""
-    numbers_of(points, count)
+        numbers_of(points, count)
 
 
 def numbers_of(points: str, count: int) -> tuple[int, ...]:
-    """Return the numbers in "37+38"; OptionError for something else, or a point beyond the last."""
+    """Return the numbers in "37+38"; OptionError for other texts, and for points that the tracker lacks."""
     if not re.fullmatch(r"\d{1,4}(\+\d{1,4})*", points, re.ASCII):
         raise OptionError(f"{points!r} is no point; expected a number, or several as in 37+38")
     numbers = tuple(map(int, points.split("+")))
@@ -75,14 +61,14 @@ def numbers_of(points: str, count: int) -> tuple[int, ...]:
 
 
 def change_places(count: int, base: Mapping[str, str] | None, pairs: Mapping[str, str]) -> dict[str, str]:
-    """Return a map with some points given by hand.
+    """Return a map in which some points are changed by hand.
 
-    base: the map that is changed, None for the table's. pairs: points -> place, or "" to leave them out.
-    Other points that had the same place lose it. OptionError for unknown points or places.
+    base: the map before; None for that of the table. pairs: points -> place, or "" to leave them out. Other
+    points that had the same place lose it. OptionError for unknown points or places.
     """
     result = change_names(
         point_places(count) if base is None else base,
-        pairs, lambda points: check_points(points, count), check_target, shared=HEAD,
+        pairs, lambda points: check_places({points: SKULL}, count), check_target, shared=SKULL,
     )  # fmt: skip
     check_places(result, count)
     return result
@@ -99,15 +85,15 @@ def write_places(path: Path, places: Mapping[str, str], count: int) -> None:
 
 
 def take_points(positions: Float64, names: tuple[str, ...]) -> Float64:
-    """Return what is at each of these points, or in their middle: positions (T, N, D) to (T, M, D)."""
+    """Return positions (T, M, D) of points, or of the middles of several, from those (T, N, D) of all."""
     count = positions.shape[1]
     return np.stack([positions[:, list(numbers_of(name, count))].mean(axis=1) for name in names], axis=1)
 
 
 def fill_points(positions: Float64) -> Float64:
-    """Return points (T, M, D) without gaps: missing ones go straight on, as the face's middle moves.
+    """Return points (T, M, D) without gaps, interpolated linearly relative to the face's middle.
 
-    positions: NaN where a point is missing; each is there in one frame at least, as is a point in each frame.
+    positions: NaN where a point is missing. Each point is seen at least once, and each frame has a point.
     """
     missing = np.isnan(positions[..., 0])
     if not missing.any():
@@ -119,4 +105,4 @@ def fill_points(positions: Float64) -> Float64:
         there = np.flatnonzero(~missing[:, point])
         for axis in range(away.shape[2]):
             away[:, point, axis] = np.interp(frames, there, away[there, point, axis])
-    return np.asarray(away + middle)
+    return away + middle

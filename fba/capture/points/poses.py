@@ -1,4 +1,4 @@
-"""Heads in pictures: where a face of known shape is seen, turned, and how large (scaled orthography)."""
+"""`fit_poses`: place, rotation and size of a face of known shape in pictures (scaled orthography)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.geometry import nearest_orthonormal
+from fba.rotations import turn
 
 PASSES = 8
-"""Steps of the fit, each with less weight for points that the one before left far off."""
-LEAST_SCALE = 2e-4
-"""Metres by which every point may be off without losing weight."""
-RIDGE = 1e-3
-"""Weight of the turn before a step, against steps into turns that the points hardly tell."""
+"""Number of steps of the fit, each with less weight for points that the previous step left far off."""
+MIN_SCALE = 2e-4
+"""Largest error, in metres, for which no point loses weight."""
+RIDGE_WEIGHT = 1e-3
+"""Weight of the rotation before a step, which limits turns that the points hardly show."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,28 +38,28 @@ class Poses:
 
 
 def fit_poses(shape: Float64, picture: Float64, trust: Float64 | None = None) -> Poses:
-    """Return how a head is seen.
+    """Return the pose of a head in each frame.
 
-    shape: float64 (K, 3), metres, its points, around their middle. picture: float64 (T, K, 2), where these
-    are, x to the right, y up. trust: (K,), how much each point counts; None if all count alike.
+    shape: float64 (K, 3), its points, metres. picture: float64 (T, K, 2), these points in the picture, x to
+    the right, y up. trust: (K,), weights of the points; None for equal weights.
     """
-    own = np.ones(len(shape)) if trust is None else trust
-    middle = own @ shape / own.sum()
+    trust = np.ones(len(shape)) if trust is None else trust
+    middle = trust @ shape / trust.sum()
     body = shape - middle
-    centre = np.einsum("k,tkc->tc", own, picture) / own.sum()
-    seen = (picture - centre[:, None]) * own[:, None]
-    first, second = np.swapaxes(np.linalg.pinv(own[:, None] * body) @ seen, 1, 2).swapaxes(0, 1)
+    centre = np.einsum("k,tkc->tc", trust, picture) / trust.sum()
+    seen = (picture - centre[:, None]) * trust[:, None]
+    first, second = np.swapaxes(np.linalg.pinv(trust[:, None] * body) @ seen, 1, 2).swapaxes(0, 1)
     both = np.stack([first, second], axis=1)
     rows = nearest_orthonormal(both)
     rotation = np.concatenate([rows, np.cross(rows[:, 0], rows[:, 1])[:, None]], axis=1)
     scale = np.einsum("tij,tij->t", rows, both) / 2
-    weights = np.broadcast_to(own, picture.shape[:2])
+    weights = np.broadcast_to(trust, picture.shape[:2])
     shift = centre
     for _ in range(PASSES):
         poses, off = _step(body, picture, Poses(scale, rotation, shift), weights)
         scale, rotation, shift = poses.scale, poses.rotation, poses.shift
-        usual = np.maximum(np.median(off[:, own > own.max() / 2], axis=1), LEAST_SCALE)
-        weights = own / (1 + (off * np.sqrt(own) / (2 * usual[:, None])) ** 2) ** 2
+        usual = np.maximum(np.median(off[:, trust > trust.max() / 2], axis=1), MIN_SCALE)
+        weights = trust / (1 + (off * np.sqrt(trust) / (2 * usual[:, None])) ** 2) ** 2
     return Poses(scale, rotation, shift - scale[:, None] * (rotation[:, :2] @ middle))
 
 
@@ -78,23 +79,12 @@ def _step(body: Float64, picture: Float64, poses: Poses, weights: Float64) -> tu
     normal = np.einsum("tkda,tkdb->tab", weighted, slopes)
     right = np.einsum("tkda,tkd->ta", weighted, off)
     total = np.einsum("taa->t", normal[:, :3, :3])
-    normal[:, range(3), range(3)] += RIDGE * total[:, None] + 1e-18
+    normal[:, range(3), range(3)] += RIDGE_WEIGHT * total[:, None] + 1e-18
     change = np.linalg.solve(normal, right[..., None])[..., 0]
-    rotation = _small_turns(change[:, :3]) @ rotation
+    angle = np.linalg.norm(change[:, :3], axis=1)
+    rotation = turn(change[:, :3] / np.maximum(angle, 1e-12)[:, None], angle) @ rotation
     shift = shift + scale[:, None] * change[:, 4:]
     scale = scale * np.exp(np.clip(change[:, 3], -0.5, 0.5))
     turned = np.einsum("tdc,kc->tkd", rotation, body)
     off = (picture - shift[:, None]) / scale[:, None, None] - turned[:, :, :2]
     return Poses(scale, rotation, shift), np.asarray(np.linalg.norm(off, axis=2))
-
-
-def _small_turns(vectors: Float64) -> Float64:
-    """Return rotations (T, 3, 3) about vectors (T, 3) by their lengths, radians."""
-    angle = np.linalg.norm(vectors, axis=1)
-    axis = vectors / np.maximum(angle, 1e-12)[:, None]
-    cross = np.zeros((len(vectors), 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
-    cross -= cross.swapaxes(1, 2)
-    sine, cosine = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    result: Float64 = np.eye(3) + sine * cross + (1 - cosine) * (cross @ cross)
-    return result

@@ -1,4 +1,4 @@
-"""`MarkedHead`: a head as virtual markers see it, a face model or a mesh that knows nothing of FAPs."""
+"""`MarkedHead`: a head for virtual markers, a face model or a mesh without FAPs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Float64, Int32, Intp
+from fba.arrays import Array, Float64, Int32, Intp
 from fba.capture.virtual_markers.influence import WalkedMesh
 from fba.choices import UpAxis
 from fba.errors import ModelError
@@ -32,26 +32,26 @@ from fba.parameters import FAP_COUNT, feature_points
 
 BUILT_IN = "built-in head"
 DEFAULT_HEIGHT = 0.26
-"""Height, in metres, that is assumed of a head whose unit is unknown."""
+"""Assumed height, in metres, of a head whose unit is unknown."""
 OUTER_GROUPS = ("2", "4", "5", "8", "9", "11")
 """Groups of feature points on the outer skin of a face."""
 DIGEST_DIGITS = 16
 """Hexadecimal digits of a digest that tell meshes apart."""
 ON_SKIN = ("brow", "lash")
-"""Kinds of parts that go with the skin around their roots."""
+"""Kinds of parts that follow the skin around their roots."""
 IN_MOUTH = ("teeth", "tongue")
-"""Kinds of parts that go with the chin, as far as the jaw's FAP moves them."""
+"""Kinds of parts that follow the chin as far as the jaw's FAP moves them."""
 OPEN_JAW = 3
 """Number of the FAP that opens the jaw."""
 OPEN_JAW_VALUE = 300
 """Value of that FAP, in MNS, at which the movement of teeth and tongue is measured."""
 CHIN_POINTS = ("2.1", "2.10")
 MAX_PIECE_DISTANCE = 0.006
-"""Largest distance from the skin, in metres, of all vertices of a piece that goes with it."""
+"""Largest distance from the skin, in metres, of all vertices of a piece that follows it."""
 MAX_PIECE_SIZE = 0.08
-"""Largest extent, in metres, of a piece that goes with the skin."""
+"""Largest extent, in metres, of a piece that follows the skin."""
 Followed = tuple[Intp, Intp, Float64]
-"""Vertices of the head, vertices of the skin that they go with, and the shares of its movement."""
+"""Vertices of the head, vertices of the skin that they follow, and the shares of its movement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +59,10 @@ class MarkedHead:
     """A head whose vertices markers can move.
 
     name: of its file, or "built-in head". parts: its surfaces, +x the subject's left, +y up, +z front, in the
-    unit of the file. rows: for each part intp (V,), the vertices of the head that its vertices are. vertices:
+    unit of the file. rows: for each part intp (V,), the numbers of its vertices in the head. vertices:
     float64 (N, 3), in the numbering of the file; of a face model, all parts in order. points: float64
-    (84, 3), feature points, NaN where unknown. bound: int32 (84,), the vertices that they are at, -1 for
-    none. metres: metres per unit. model: the face model that it is, or None.
+    (84, 3), feature points, NaN where unknown. bound: int32 (84,), their vertices, -1 for none. metres: per
+    unit. model: the face model, or None.
     """
 
     name: str
@@ -83,7 +83,7 @@ class MarkedHead:
 
     @cached_property
     def skin(self) -> Surface:
-        """The surface on which virtual markers are, vertices at seams joined: lips that touch stay apart."""
+        """The surface of virtual markers, with vertices at seams joined; lips that touch stay apart."""
         skins = [n for n, part in enumerate(self.parts) if part.kind in SURFACE_KINDS]
         chosen = skins if self.model is not None and skins else range(len(self.parts))
         triangles = np.concatenate([self.rows[n][self.parts[n].triangles] for n in chosen])
@@ -97,12 +97,12 @@ class MarkedHead:
 
     @cached_property
     def followers(self) -> Any:
-        """Sparse float64 (N, S): how far each vertex goes with each vertex of the skin."""
+        """Sparse float64 (N, S): the share of each skin vertex's movement that each vertex makes."""
         return find_followers(self.parts, self.rows, self.skin, self.metres, self.model)
 
     @cached_property
     def landmarks(self) -> Landmarks | None:
-        """Contours on the skin, in metres; None where its feature points do not tell."""
+        """Contours on the skin, in metres; None without the needed feature points."""
         try:
             return find_landmarks(self.skin, self.points * self.metres, self.bound)
         except ModelError:  # a face without units
@@ -110,7 +110,7 @@ class MarkedHead:
 
     @cached_property
     def face(self) -> Intp:
-        """(K,) vertices of the piece of skin that has most of the feature points, or that is largest."""
+        """Vertices (K,) of the piece of skin with most of the feature points, or else the largest."""
         component = self.skin.component
         number = self.skin.number
         used = np.unique(self.triangles)
@@ -118,25 +118,29 @@ class MarkedHead:
             row for row, point in enumerate(feature_points()) if point.name.split(".")[0] in OUTER_GROUPS
         ]
         bound = self.bound[outside]
-        known = number[bound[bound >= 0]] if (bound >= 0).any() else number[used]
-        main = int(np.bincount(component[known]).argmax())
+        counted = number[bound[bound >= 0]] if (bound >= 0).any() else number[used]
+        main = int(np.bincount(component[counted]).argmax())
         return np.asarray(used[component[number[used]] == main], dtype=np.intp)
 
     @cached_property
     def connectivity(self) -> str:
-        """A digest of the triangles: two meshes with the same one have the same vertex numbers."""
-        return sha256(np.ascontiguousarray(self.triangles, dtype="<i4").tobytes()).hexdigest()[:DIGEST_DIGITS]
+        """A digest of the triangles: meshes that share it have the same vertex numbers."""
+        return _digest(self.triangles, "<i4")
 
     @cached_property
     def shape(self) -> str:
-        """A digest of where the vertices are, in single precision."""
-        return sha256(np.ascontiguousarray(self.vertices, dtype="<f4").tobytes()).hexdigest()[:DIGEST_DIGITS]
+        """A digest of the vertices, in single precision."""
+        return _digest(self.vertices, "<f4")
 
     def nearest(self, place: Float64) -> tuple[int, float]:
-        """Return the vertex of the face that is nearest to a place (3,), and how far away it is."""
+        """Return the vertex of the face nearest to a place (3,), and its distance."""
         away = np.linalg.norm(self.vertices[self.face] - place, axis=1)
         best = int(away.argmin())
         return int(self.face[best]), float(away[best])
+
+
+def _digest(array: Array, kind: str) -> str:
+    return sha256(np.ascontiguousarray(array, dtype=kind).tobytes()).hexdigest()[:DIGEST_DIGITS]
 
 
 def head_of_model(model: FaceModel, name: str = BUILT_IN) -> MarkedHead:
@@ -187,7 +191,7 @@ def read_head(
     """Return the head in a file; None for the built-in head. Arguments and errors as of `import_model`.
 
     A face model of this project, MakeHuman's head and FDP files become models; any other mesh (OBJ, PLY,
-    Candide, glTF) stays as its file has it, with its numbers of vertices, and needs no feature points.
+    Candide, glTF) keeps the numbers of its vertices, and needs no feature points.
     """
     if path is None:
         return head_of_model(FaceModel.default())
@@ -206,42 +210,38 @@ def find_followers(
 ) -> Any:
     """Return the share of each skin vertex's movement that each vertex of a head makes: sparse (N, S).
 
-    parts, rows, metres, model: as of `MarkedHead`. skin: whose `number` has N vertices. A vertex of the skin
-    goes with itself. Of a face model, brows and lashes go with the skin around their roots, teeth and tongue
-    with the chin as far as FAP 3 moves them. Of another head, small pieces close to the skin go with it.
+    parts, rows, metres, model: as of `MarkedHead`. skin: of the head; its `number` has N vertices. Vertices
+    of the skin follow themselves. Of a face model, brows and lashes follow the skin around their roots, teeth
+    and tongue the chin as far as FAP 3 moves them. Of another head, small pieces follow the skin if they are
+    close to it.
     """
     from scipy.sparse import csr_array
 
     if model is None:
-        found = _small_pieces(skin, metres)
+        followed = _small_pieces(skin, metres)
     else:
-        found = []
+        followed = []
         opened = _jaw_opening(model)
-        for part, own in zip(parts, rows, strict=True):
+        for part, numbers in zip(parts, rows, strict=True):
             if part.kind in ON_SKIN and len(part.triangles):
-                found.append(_follow_skin(skin, part, own))
+                anchors = attach(skin, part)
+                corners = skin.triangles[anchors.triangles]
+                followed.append((np.repeat(numbers, 3), corners.ravel(), anchors.shares.ravel()))
             elif part.kind in IN_MOUTH:
-                found += _follow_jaw(model, skin, part, own, opened)
+                followed += _follow_jaw(model, skin, numbers, opened)
     alone = np.ones(len(skin.number), dtype=bool)
-    for each, _, _ in found:
-        alone[each] = False
+    for vertices, _, _ in followed:
+        alone[vertices] = False
     themselves = np.flatnonzero(alone)
-    every = np.concatenate([themselves, *(each for each, _, _ in found)])
-    goes_with = np.concatenate([skin.number[themselves], *(each for _, each, _ in found)])
-    values = np.concatenate([np.ones(len(themselves)), *(each for _, _, each in found)])
-    return csr_array((values, (every, goes_with)), shape=(len(skin.number), len(skin)))
+    followed.append((themselves, skin.number[themselves], np.ones(len(themselves))))
+    vertices, leaders, shares = (np.concatenate(columns) for columns in zip(*followed, strict=True))
+    return csr_array((shares, (vertices, leaders)), shape=(len(skin.number), len(skin)))
 
 
-def _follow_skin(skin: Surface, part: Part, rows: Intp) -> Followed:
-    anchors = attach(skin, part)
-    corners = skin.triangles[anchors.triangles]
-    return np.repeat(rows, 3), corners.ravel(), anchors.shares.ravel()
+def _follow_jaw(model: FaceModel, skin: Surface, rows: Intp, opened: Float64) -> list[Followed]:
+    """Return how vertices follow the chin, as far as the jaw moves them; empty if it does not.
 
-
-def _follow_jaw(model: FaceModel, skin: Surface, part: Part, rows: Intp, opened: Float64) -> list[Followed]:
-    """Return how a part goes with the chin, as far as the jaw moves it; empty if it does not.
-
-    opened: float64 (N, 3), how far each vertex moves when the jaw opens.
+    opened: float64 (N, 3), displacement of each vertex when the jaw opens.
     """
     chin = next((int(model.bound[point_row(name)]) for name in CHIN_POINTS), -1)
     whole = float(np.linalg.norm(opened[chin])) if chin >= 0 else 0.0
@@ -253,16 +253,16 @@ def _follow_jaw(model: FaceModel, skin: Surface, part: Part, rows: Intp, opened:
 
 
 def _jaw_opening(model: FaceModel) -> Float64:
-    """Return how far each vertex moves when the jaw opens: float64 (N, 3), metres."""
+    """Return the displacement of each vertex when the jaw opens: float64 (N, 3), metres."""
     faps = np.zeros(FAP_COUNT, dtype=np.float32)
     deformer = Deformer(model)
     rest = deformer.local(faps).astype(np.float64)
     faps[OPEN_JAW - 1] = OPEN_JAW_VALUE
-    return np.asarray(deformer.local(faps) - rest)
+    return deformer.local(faps) - rest
 
 
 def _small_pieces(skin: Surface, metres: float) -> list[Followed]:
-    """Return how small connected pieces go with the largest one, if they lie on it."""
+    """Return how small connected pieces follow the largest piece, if they lie on it."""
     from scipy.spatial import cKDTree
 
     used = np.unique(skin.triangles)
@@ -280,7 +280,7 @@ def _small_pieces(skin: Surface, metres: float) -> list[Followed]:
     np.minimum.at(low, piece, skin.vertices[others])
     np.maximum.at(high, piece, skin.vertices[others])
     lies = (farthest * metres < MAX_PIECE_DISTANCE) & ((high - low).max(axis=1) * metres < MAX_PIECE_SIZE)
-    goes_with = np.full(len(skin), -1)
-    goes_with[others[lies[piece]]] = main[nearest[lies[piece]]]
-    vertices = np.flatnonzero(goes_with[skin.number] >= 0)
-    return [(vertices, goes_with[skin.number[vertices]], np.ones(len(vertices)))]
+    leader = np.full(len(skin), -1)
+    leader[others[lies[piece]]] = main[nearest[lies[piece]]]
+    vertices = np.flatnonzero(leader[skin.number] >= 0)
+    return [(vertices, leader[skin.number[vertices]], np.ones(len(vertices)))]

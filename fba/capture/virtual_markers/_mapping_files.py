@@ -21,17 +21,31 @@ HEADING = """\
 # the head. Fixed markers are not moved by the face; they tell how the head moves. Change what you like and
 # give it to `fba markers --map`.
 """
-KEYS = {
-    "vertex": int,
-    "radius": (int, float),
-    "depth": (int, float),
-    "fixed": bool,
-    "follows": str,
-    "share": (int, float),
-    "lid": bool,
+Kinds = Mapping[str, tuple[Any, str]]
+"""Keys of a table, the types of their values, and words for these."""
+MARKER_KINDS: Kinds = {
+    "vertex": (int, "a whole number"),
+    "radius": ((int, float), "a number"),
+    "depth": ((int, float), "a number"),
+    "fixed": (bool, "true or false"),
+    "follows": (str, "a text"),
+    "share": ((int, float), "a number"),
+    "lid": (bool, "true or false"),
 }
-MARKER_WORDS = {int: "a whole number", (int, float): "a number", bool: "true or false", str: "a text"}
-COUNTS, TEXTS = ("vertices", "triangles"), ("name", "connectivity", "shape")
+HEAD_KINDS: Kinds = {
+    "name": (str, "a text"),
+    "connectivity": (str, "a text"),
+    "shape": (str, "a text"),
+    "vertices": (int, "a number"),
+    "triangles": (int, "a number"),
+}
+SETTING_KINDS: Kinds = {
+    "assignment": (str, "a word"),
+    "overlap": (str, "a word"),
+    "gaze": (str, "a word"),
+    "squint": ((int, float), "a number from 0 to 1"),
+    "scale": (list, "a list of two markers"),
+}
 
 
 def read_mapping(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> MarkerMapping:
@@ -52,7 +66,7 @@ def read_mapping(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> MarkerMappin
             **_read_settings(content.get("settings", {})),
             made_for=_read_head(content["head"]) if "head" in content else None,
         )
-    except OptionError as error:
+    except (OptionError, OverflowError) as error:
         raise FormatError(str(error), path=path) from None
 
 
@@ -60,15 +74,12 @@ def write_mapping(path: Path, mapping: MarkerMapping) -> None:
     """Write a mapping as TOML, completely or not at all."""
     lines = [HEADING]
     if mapping.made_for is not None:
-        made = mapping.made_for
-        lines += ["[head]", f"name = {_text(made.name)}"]
-        lines += [f"{key} = {getattr(made, key)}" for key in COUNTS]
-        lines += [f"connectivity = {_text(made.connectivity)}", f"shape = {_text(made.shape)}", ""]
-    lines += [
-        "[settings]",
-        f"assignment = {_text(mapping.assignment)}",
-        f"overlap = {_text(mapping.overlap)}",
-    ]
+        lines.append("[head]")
+        for key, value in vars(mapping.made_for).items():
+            lines.append(f"{key} = {_text(value) if isinstance(value, str) else value}")
+        lines.append("")
+    lines.append("[settings]")
+    lines += [f"assignment = {_text(mapping.assignment)}", f"overlap = {_text(mapping.overlap)}"]
     if mapping.gaze != "none":
         lines.append(f"gaze = {_text(mapping.gaze)}")
     if mapping.squint:
@@ -84,60 +95,44 @@ def write_mapping(path: Path, mapping: MarkerMapping) -> None:
 def _read_marker(name: str, entry: Any) -> VirtualMarker:
     if not isinstance(entry, dict):
         raise OptionError(f"{name!r} is {entry!r}; expected a table such as {EXAMPLE.partition('= ')[2]}")
-    for key, value in entry.items():
-        if key not in KEYS:
-            raise OptionError(f"{name!r}: there is no {key!r}; known are {', '.join(KEYS)}")
-        kind: Any = KEYS[key]
-        if not isinstance(value, kind) or (kind is not bool and isinstance(value, bool)):
-            raise OptionError(f"{name!r}: {key} must be {MARKER_WORDS[kind]}, not {value!r}")
-    fixed = bool(entry.get("fixed", False))
-    if "vertex" not in entry and not fixed:
+    _check(entry, repr(name), MARKER_KINDS)
+    if "vertex" not in entry and not entry.get("fixed"):
         raise OptionError(f"{name!r} has no vertex; only fixed markers may be beside the face")
     if "vertex" in entry and "radius" not in entry:
         raise OptionError(f"{name!r} has no radius")
     try:
-        radius = float(entry.get("radius", 0.0))
-        depth = float(entry.get("depth", radius))
-        follows, share = entry.get("follows", ""), float(entry.get("share", 1.0))
-        lid = bool(entry.get("lid", False))
-        return VirtualMarker(entry.get("vertex"), radius, depth, fixed, follows, share, lid)
+        sizes = {key: float(entry[key]) for key in ("radius", "depth", "share") if key in entry}
+        if "radius" in sizes:
+            sizes.setdefault("depth", sizes["radius"])
+        return VirtualMarker(**{"vertex": None, **entry, **sizes})
     except (OptionError, OverflowError) as error:
         raise OptionError(f"{name!r}: {error}") from None
 
 
 def _read_settings(table: Any) -> dict[str, Any]:
-    settings = _checked_table(table, "settings", ("assignment", "overlap", "scale", "gaze", "squint"))
-    result: dict[str, Any] = {}
-    for key in ("assignment", "overlap", "gaze"):
-        if key in settings:
-            if not isinstance(settings[key], str):
-                raise OptionError(f"settings: {key} must be a word, not {settings[key]!r}")
-            result[key] = settings[key]
-    squint = settings.get("squint", 0.0)
-    if isinstance(squint, bool) or not isinstance(squint, int | float):
-        raise OptionError(f"settings: squint must be a number from 0 to 1, not {squint!r}")
+    settings = _check(table, "settings", SETTING_KINDS)
     scale = settings.get("scale", [])
-    if not isinstance(scale, list) or not all(isinstance(name, str) for name in scale):
+    if not all(isinstance(name, str) for name in scale):
         raise OptionError(f"settings: scale must be a list of two markers, not {scale!r}")
-    return {**result, "squint": float(squint), "scale": tuple(scale)}
+    return {**settings, "squint": float(settings.get("squint", 0.0)), "scale": tuple(scale)}
 
 
 def _read_head(table: Any) -> MadeFor:
-    head = _checked_table(table, "head", (*TEXTS, *COUNTS))
-    for key in (*TEXTS, *COUNTS):
-        value = head.get(key)
-        kind = str if key in TEXTS else int
-        if not isinstance(value, kind) or isinstance(value, bool):
-            raise OptionError(f"head: {key} must be {'a text' if kind is str else 'a number'}, not {value!r}")
-    return MadeFor(**head)
+    if isinstance(table, dict):
+        table = {**dict.fromkeys(HEAD_KINDS), **table}
+    return MadeFor(**_check(table, "head", HEAD_KINDS))
 
 
-def _checked_table(table: Any, name: str, known: tuple[str, ...]) -> Mapping[str, Any]:
+def _check(table: Any, where: str, kinds: Kinds) -> dict[str, Any]:
+    """Return a table; OptionError for unknown keys, and for values of other types."""
     if not isinstance(table, dict):
-        raise OptionError(f"{name} must be a table, not {table!r}")
-    for key in table:
-        if key not in known:
-            raise OptionError(f"{name}: there is no {key!r}; known are {', '.join(known)}")
+        raise OptionError(f"{where} must be a table, not {table!r}")
+    for key, value in table.items():
+        if key not in kinds:
+            raise OptionError(f"{where}: there is no {key!r}; known are {', '.join(kinds)}")
+        kind, words = kinds[key]
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            raise OptionError(f"{where}: {key} must be {words}, not {value!r}")
     return table
 
 
@@ -157,5 +152,5 @@ def _entry(marker: VirtualMarker) -> str:
 
 
 def _text(text: str) -> str:
-    """Return a text as TOML writes it; DEL must not stand for itself there, other than in JSON."""
+    """Return a text as TOML writes it: as JSON, but with DEL escaped."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

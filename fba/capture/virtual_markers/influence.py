@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fba.arrays import Float64, Int64, Integer, Intp
+from fba.arrays import Bool, Float64, Int64, Integer, Intp
 from fba.compiled import compiled
 from fba.errors import ModelError
 
@@ -20,10 +20,9 @@ MAX_SHARES = 30_000_000
 class Influence:
     """The vertices that a virtual marker moves.
 
-    vertices: intp (K,), the centre first, in the order in which the walk meets them. distances: float64 (K,)
-    from the centre, in the unit of the mesh. levels: intp (K,), 1 for the centre, 2 for those next to it, and
-    so on. radius: of the cylinder. given: float64 (K,), shares that do not follow from the distance; None if
-    they do.
+    vertices: intp (K,), the centre first, in the order of the walk. distances: float64 (K,) from the centre,
+    in the unit of the mesh. levels: intp (K,), 1 for the centre, 2 for its neighbours, and so on. radius: of
+    the cylinder. given: float64 (K,), shares that do not follow from the distance; None if they do.
     """
 
     vertices: Intp
@@ -34,13 +33,18 @@ class Influence:
 
     @property
     def shares(self) -> Float64:
-        """float64 (K,): by how much of the marker's displacement each moves, 1 at the centre, 0 at the edge.
+        """float64 (K,): the share of the marker's displacement by which each moves, 1 at the centre.
 
-        At the ends of a cylinder that is longer than wide, the distance is more than the radius: 0, too.
+        It is 0 at the edge, and at the ends of a cylinder that is longer than wide.
         """
         if self.given is not None:
             return self.given
         return np.maximum(1.0 - self.distances / self.radius, 0.0)
+
+    def select(self, kept: Bool) -> Influence:
+        """Return the influence without the vertices that are not kept (K,)."""
+        given = None if self.given is None else self.given[kept]
+        return Influence(self.vertices[kept], self.distances[kept], self.levels[kept], self.radius, given)
 
 
 class WalkedMesh:
@@ -62,10 +66,10 @@ class WalkedMesh:
         """Return the influence of each (centre vertex, radius, depth).
 
         A vertex is inside if it is nearer than `radius` to the centre in x and y, and at most `depth` before
-        or behind it in z. The walk goes from the centre to all other corners of its triangles, on from those
-        that are inside, and ends where nothing new is: an upper lip is not joined to the lower one by being
-        near. Time is linear in what is met. Raises ModelError for a centre that is no vertex, or sizes that
-        are not positive numbers; LimitError for influences that would not fit into memory.
+        or behind it in z. The walk goes from the centre to all other corners of its triangles, and on from
+        those that are inside. So an upper lip does not move the lower lip, however near it is. Time is linear
+        in the visited vertices. Raises ModelError for a centre that is no vertex, sizes that are not positive
+        numbers, and influences that would not fit into memory.
         """
         count = len(self.vertices)
         starts, listed = self._listed
@@ -112,7 +116,7 @@ def find_influence(
 
 
 def give_to_nearest(influences: Sequence[Influence]) -> list[Influence]:
-    """Return influences of which each vertex is in one only: that whose centre is nearest, or the first."""
+    """Return influences without common vertices: each vertex stays with the nearest centre, or the first."""
     if not influences:
         return []
     vertices = np.concatenate([each.vertices for each in influences])
@@ -124,16 +128,7 @@ def give_to_nearest(influences: Sequence[Influence]) -> list[Influence]:
     kept = np.zeros(len(order), dtype=bool)
     kept[order[first]] = True
     ends = np.cumsum([len(each.vertices) for each in influences])[:-1]
-    return [
-        Influence(
-            each.vertices[mine],
-            each.distances[mine],
-            each.levels[mine],
-            each.radius,
-            None if each.given is None else each.given[mine],
-        )
-        for each, mine in zip(influences, np.split(kept, ends), strict=True)
-    ]
+    return [each.select(mine) for each, mine in zip(influences, np.split(kept, ends), strict=True)]
 
 
 @compiled
@@ -175,12 +170,12 @@ def _walk_from(
 ) -> int:
     """Walk from a centre over the triangles as long as vertices are inside its cylinder; return how many are.
 
-    number: differs in each call with the same `tested`, (V,), which notes the vertices met. found, away,
-    levels: (V,), the vertices inside in the order in which they are met, their distances from the centre, and
-    the steps to them, 1 for the centre itself.
+    number: differs in each call with the same `tested`, (V,), which notes the visited vertices. found, away,
+    levels: (V,), the vertices inside in the order of the walk, their distances from the centre, and the steps
+    to them, 1 for the centre.
 
-    Bounds: the centre and corners are below V, as `WalkedMesh` checks. A vertex is found once, as it is
-    tested first: no more than V are.
+    Bounds: the centre and corners are below V, as `WalkedMesh` checks. Each vertex is tested, and found, at
+    most once, so no more than V are.
     """
     x, y, z = vertices[centre, 0], vertices[centre, 1], vertices[centre, 2]
     tested[centre] = number

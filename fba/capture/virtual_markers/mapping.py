@@ -15,23 +15,23 @@ from fba.name_maps import list_names
 ASSIGNMENTS: tuple[Assignment, ...] = get_args(Assignment)
 OVERLAPS: tuple[Overlap, ...] = get_args(Overlap)
 GAZES: tuple[Gaze, ...] = get_args(Gaze)
-MOST_SHARE = 10.0
-"""Largest share by which one marker goes with another."""
+MAX_SHARE = 10.0
+"""Largest share by which a marker follows another."""
 MAX_SIZE = 1e9
 """Largest radius or depth, in the unit of the head."""
 
 
 @dataclass(frozen=True)
 class VirtualMarker:
-    """A virtual marker: what one captured marker moves.
+    """A virtual marker: the part of a head that a captured marker moves.
 
-    vertex: its centre, a vertex of the head; None for a fixed marker beside the face, such as one on a cap,
-    which only tells how the head moves. radius: of the cylinder around the centre, in x and y. depth: half
-    the cylinder's length, along z. Both in the unit of the head. fixed: the face does not move it; what the
-    capture says of it is how the head moves. follows: the captured marker that it goes with, "" for that of
-    its own name: so a marker on the outer lip takes the inner one along, where nothing can be glued. share:
-    how far it goes with that one, above 0. lid: the vertex is on the margin of a lid; instead of a cylinder,
-    rows along the lid move, up to the radius above the margin, see `lids.find_rows`.
+    vertex: its centre, a vertex of the head; None for a fixed marker beside the face, as on a cap. radius: of
+    the cylinder around the centre, in x and y. depth: half the cylinder's length, along z. Both are in the
+    unit of the head. fixed: the face does not move the marker, which shows how the head moves. follows: the
+    captured marker that moves it, "" for that of the same name: so a marker on the outer lip also moves the
+    inner lip, where nothing can be glued. share: of the displacement of that marker, above 0. lid: the vertex
+    is on the margin of a lid; instead of a cylinder, rows along the lid move, up to the radius above the
+    margin, see `lids.find_rows`.
     """
 
     vertex: int | None
@@ -43,13 +43,14 @@ class VirtualMarker:
     lid: bool = False
 
     def __post_init__(self) -> None:
-        if self.follows and (self.fixed or self.vertex is None):
+        moves = not self.fixed and self.vertex is not None
+        if self.follows and not moves:
             raise OptionError(f"what follows {self.follows!r} needs a vertex, and cannot be fixed")
-        if self.share != 1.0 and not (self.follows and 0 < self.share <= MOST_SHARE):
+        if self.share != 1.0 and not (self.follows and 0 < self.share <= MAX_SHARE):
             raise OptionError(
-                f"a share, from above 0 to {MOST_SHARE:g}, is of what another marker does, not {self.share:g}"
+                f"a share, from above 0 to {MAX_SHARE:g}, is of what another marker does, not {self.share:g}"
             )
-        if self.lid and (self.fixed or self.vertex is None):
+        if self.lid and not moves:
             raise OptionError("a lid's marker needs a vertex, and cannot be fixed")
         if self.vertex is None:
             if not self.fixed:
@@ -66,8 +67,7 @@ class VirtualMarker:
 
 @dataclass(frozen=True)
 class MadeFor:
-    """The mesh that a mapping was made for: its name, how many vertices and triangles it has, and digests of
-    both, see `MarkedHead`."""
+    """The mesh of a mapping: its name, counts of vertices and triangles, and digests, see `MarkedHead`."""
 
     name: str
     vertices: int
@@ -80,14 +80,14 @@ class MadeFor:
 class MarkerMapping:
     """The virtual markers of a head.
 
-    markers: by the name of the captured marker, or any other name of one that follows another. assignment:
-    "shared", a vertex belongs to all virtual markers in whose reach it is, or "exclusive", to the nearest
-    alone. overlap: how displacements of shared vertices go together. "match": so that each centre goes where
-    its marker goes. "add": they are added, as in the source of this method, and centres go too far where
-    markers are close to each other. scale: two fixed markers; the distance of their vertices over their own
-    is the scale of all displacements; () for the farthest apart. gaze: "none", eyes stay in the head as they
-    are, or "camera": they turn against the head, so that they keep looking where they did. squint: 0 to 1, by
-    which share eyes are narrowed, whatever the markers of lids do. made_for: the mesh, None if unknown.
+    markers: by the name of the captured marker, or any other name if they follow another marker. assignment:
+    "shared", a vertex belongs to all virtual markers that reach it, or "exclusive", to the nearest alone.
+    overlap: how displacements of shared vertices are combined. "match": each centre moves exactly as its
+    marker. "add": they are added, as in the source of this method, and centres of close markers move too far.
+    scale: two fixed markers; the ratio of the distances of their vertices and of the captured markers is the
+    scale of all displacements; () for the farthest apart. gaze: "none", eyes do not turn in the head, or
+    "camera", they turn against the head and keep looking at the camera. squint: 0 to 1, the share by which
+    eyes are narrowed, whatever the markers of lids do. made_for: the mesh, None if unknown.
 
     Raises OptionError for parts that contradict each other.
     """
@@ -128,23 +128,23 @@ class MarkerMapping:
 
     @property
     def centres(self) -> dict[str, VirtualMarker]:
-        """Those with a vertex."""
+        """Virtual markers with a vertex."""
         return {name: marker for name, marker in self.markers.items() if marker.vertex is not None}
 
     @property
     def captured(self) -> tuple[str, ...]:
-        """Names of the captured markers that are needed."""
+        """Names of the needed captured markers."""
         return tuple(dict.fromkeys(marker.follows or name for name, marker in self.markers.items()))
 
     @property
     def fixed(self) -> tuple[str, ...]:
-        """Names of the fixed ones."""
+        """Names of the fixed markers."""
         return tuple(name for name, marker in self.markers.items() if marker.fixed)
 
     def changed(self, name: str, marker: VirtualMarker | None) -> MarkerMapping:
-        """Return the mapping with another virtual marker for a captured one; None takes it away.
+        """Return the mapping with another virtual marker for a captured marker; None removes it.
 
-        One that was at the same vertex is taken away, and the pair of the scale if it is no longer one.
+        A marker at the same vertex is removed, and so is a pair of the scale that became invalid.
         """
         vertex = None if marker is None else marker.vertex
         kept = {
@@ -156,11 +156,11 @@ class MarkerMapping:
             kept.pop(name, None)
         else:
             kept[name] = marker
-        still = all(one in kept and kept[one].fixed and kept[one].vertex is not None for one in self.scale)
+        still = all(end in kept and kept[end].fixed and kept[end].vertex is not None for end in self.scale)
         return replace(self, markers=kept, scale=self.scale if still else ())
 
     def for_head(self, head: MarkedHead) -> MarkerMapping:
-        """Return the mapping, marked as made for a head."""
+        """Return the mapping with this head in `made_for`."""
         made_for = MadeFor(head.name, len(head.vertices), len(head.triangles), head.connectivity, head.shape)
         return replace(self, made_for=made_for)
 
@@ -171,22 +171,19 @@ class MarkerMapping:
         """
         import warnings
 
-        own = self.made_for
-        if own is not None:
+        made_for = self.made_for
+        if made_for is not None:
+            there = (made_for.vertices, made_for.triangles)
             here = (len(head.vertices), len(head.triangles))
-            if (own.vertices, own.triangles) != here or own.connectivity != head.connectivity:
-                counts = (
-                    f"it has {own.vertices} vertices and {own.triangles} triangles there, {here[0]} and "
-                    f"{here[1]} here"
-                    if (own.vertices, own.triangles) != here
-                    else "its triangles join other vertices"
-                )
+            if there != here or made_for.connectivity != head.connectivity:
+                counts = f"{there[0]} vertices and {there[1]} triangles there, {here[0]} and {here[1]}"
+                how = "its triangles join other vertices" if there == here else f"it has {counts} here"
                 raise ModelError(
-                    f"the mapping was made for another mesh ({own.name}) than {head.name}: {counts}; vertex "
-                    "numbers would mean other places. Give the head that it was made for, or map this one "
-                    "anew"
+                    f"the mapping was made for another mesh ({made_for.name}) than {head.name}: {how}; "
+                    "vertex numbers would mean other places. Give the head that it was made for, or map "
+                    "this one anew"
                 )
-            if own.shape != head.shape:
+            if made_for.shape != head.shape:
                 warnings.warn(
                     f"{head.name}: vertices were moved since the mapping was made; it is used as it is, as "
                     "their numbers are the same", FbaWarning, stacklevel=3,

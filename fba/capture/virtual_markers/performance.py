@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
-from fba.capture.markers._gaps import RARELY, fill_gaps, warn_of_gaps
+from fba.capture.markers._gaps import fill_gaps, often_seen, warn_of_gaps
 from fba.capture.markers._neutral import neutral_frames
 from fba.capture.markers._stabilisation import follow_head, relate_poses, remove_poses
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.virtual_markers._alignment import align
+from fba.capture.virtual_markers._alignment import lay_onto
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import Eye, find_eyes, narrow, turn_to_camera
 from fba.capture.virtual_markers.mapping import MarkerMapping
 from fba.capture.virtual_markers.weights import MarkerWeights, find_weights
 from fba.choices import Gaze
 from fba.errors import FbaWarning, ModelError
-from fba.name_maps import list_names
 
-FEWEST_FIXED = 3
-"""Fixed markers from which the head's motion is measured at least."""
-TOGETHER = 1e-3
-"""Two fixed markers are at one place if they are closer than this share of the size of the cloud."""
-ODD_SCALE = 1.5
-"""The scale by two markers is doubtful if it is off by this factor from what all markers say."""
+MIN_FIXED = 3
+"""Smallest number of fixed markers that show the head's motion."""
+MIN_DISTANCE = 1e-3
+"""Smallest distance between the two fixed markers of the scale, as a share of the size of the cloud."""
+MAX_SCALE_RATIO = 1.5
+"""Largest ratio of the scales by two fixed markers and by all markers that raises no doubt."""
 Neutral = str | int | tuple[float, float]
 
 
@@ -36,9 +36,9 @@ Neutral = str | int | tuple[float, float]
 class SteadyMarkers:
     """Captured markers without the head's motion.
 
-    names: of the markers. local: float64 (T, K, 3), metres, in the capture's axes, as if the head stayed as
-    it is in the neutral face. rotation (T, 3, 3), shift (T, 3): the head's motion from there. neutral:
-    float64 (K, 3), the markers of the neutral face. rest: its first frame, and the one after its last.
+    names: of the markers. local: float64 (T, K, 3), metres, in the capture's axes, as if the head stayed
+    where it is in the neutral face. rotation (T, 3, 3), shift (T, 3): the head's motion from there. neutral:
+    float64 (K, 3), the markers of the neutral face. rest: its first frame, and the frame after its last.
     """
 
     names: tuple[str, ...]
@@ -56,9 +56,9 @@ class MarkerPerformance:
     rate, times: the capture's. names: of the K virtual markers with a vertex. displacements: float64
     (T, K, 3), how far each marker moves from the neutral face, in the head's axes and unit; 0 where it is
     fixed. rotation (T, 3, 3), shift (T, 3): the head's motion. scale: the head's units per metre of the
-    capture. cloud: float64 (T, M, 3), all markers of the capture as they are in the head's axes, NaN where
-    one was not seen. weights: which vertices go with which markers. rest: float64 (N, 3), the vertices from
-    which they move: the head's, or with narrowed eyes. eyes: those that look at the camera. looks: float64
+    capture. cloud: float64 (T, M, 3), all markers of the capture in the head's axes, NaN where a marker was
+    not seen. weights: which vertices go with which markers. rest: float64 (N, 3), the vertices from which
+    they move: the head's, or with narrowed eyes. eyes: those that look at the camera. looks: float64
     (T, 3, 3), how they turn in the head.
     """
 
@@ -75,10 +75,6 @@ class MarkerPerformance:
     rest: Float64
     eyes: tuple[Eye, ...]
     looks: Float64
-    _moves: Float64 = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_moves", np.matmul(self.weights.solve, self.displacements))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -88,18 +84,19 @@ class MarkerPerformance:
         """Of the virtual markers with a vertex."""
         return self.weights.names
 
-    @property
+    @cached_property
     def moves(self) -> Float64:
-        """float64 (T, K, 3): what the shares of `weights` are multiplied by, in each frame."""
-        return self._moves
+        """float64 (T, K, 3): the factors of the shares of `weights` in each frame."""
+        moves: Float64 = np.matmul(self.weights.solve, self.displacements)
+        return moves
 
     def vertices(self, frame: int) -> Float64:
         """Return the head's vertices in a frame, float64 (N, 3), without the head's motion."""
         return self.vertices_between(frame, frame, 0.0)
 
     def vertices_between(self, frame: int, after: int, share: float) -> Float64:
-        """Return the vertices between two frames. share: of the later one, 0..1."""
-        moves = self._moves[frame] + share * (self._moves[after] - self._moves[frame])
+        """Return the vertices between two frames. share: of the later frame, 0..1."""
+        moves = self.moves[frame] + share * (self.moves[after] - self.moves[frame])
         result: Float64 = self.rest + self.weights.shares @ moves
         if self.eyes:
             turn = rotations.part(self.looks[frame], self.looks[after], share)
@@ -125,21 +122,13 @@ def steady(motion: MarkerMotion, mapping: MarkerMapping, neutral: Neutral = "aut
     if not len(motion):
         raise ModelError("the capture has no frames")
     mapping.check_names(motion.names)
-    columns = [motion.names.index(name) for name in mapping.captured]
-    positions = motion.positions[:, columns]
-    often = (~np.isnan(positions[..., 0])).mean(axis=0) >= RARELY
-    names = tuple(name for name, kept in zip(mapping.captured, often, strict=True) if kept)
-    if len(names) < len(columns):
-        rare = [name for name in mapping.captured if name not in names]
-        warnings.warn(
-            f"seen in less than {RARELY:.0%} of the frames, and left out: {list_names(rare)}",
-            FbaWarning, stacklevel=4,
-        )  # fmt: skip
-    positions = positions[:, often]
+    captured = mapping.captured
+    names = often_seen(captured, motion.seen[:, [motion.names.index(name) for name in captured]])
+    positions = motion.positions[:, [motion.names.index(name) for name in names]]
     fixed = [n for n, name in enumerate(names) if name in mapping.fixed]
-    if len(fixed) < FEWEST_FIXED:
+    if len(fixed) < MIN_FIXED:
         raise ModelError(
-            f"the head's motion needs {FEWEST_FIXED} fixed markers (hairline, ears, bridge of the nose, a "
+            f"the head's motion needs {MIN_FIXED} fixed markers (hairline, ears, bridge of the nose, a "
             f"cap); the mapping has {len(fixed)}: mark more of them as fixed"
         )
     if len(fixed) == len(names):
@@ -171,25 +160,25 @@ def move_head(
 def perform_steady(
     motion: MarkerMotion, head: MarkedHead, mapping: MarkerMapping, markers: SteadyMarkers
 ) -> MarkerPerformance:
-    """Return a head moved by a capture whose markers are steady already. mapping: a checked one."""
+    """Return a head moved by a capture with steady markers. mapping: checked for the head."""
     kept = mapping.centres
     placed = [n for n, name in enumerate(markers.names) if name in kept]
     vertices = [kept[markers.names[n]].vertex for n in placed]
     centres = head.vertices[np.array(vertices, dtype=np.intp)]
-    fit = align(markers.neutral[placed], centres)
-    if fit.mirrored:
+    fit = lay_onto(markers.neutral[placed], centres)
+    if np.linalg.det(fit.rotation) < 0:
         warnings.warn("the capture is mirrored: x is turned round", FbaWarning, stacklevel=3)
-    scale = _measure_scale(head, mapping, markers, fit.scale)
-    turn = fit.rotation * fit.mirror  # from the capture's axes to the head's
+    scale = _measure_scale(head, mapping, markers, float(fit.scale))
+    turn = fit.rotation  # from the capture's axes to the head's
     local = np.einsum("ij,tkj->tki", scale * turn, markers.local - markers.neutral)
     columns = {name: n for n, name in enumerate(markers.names)}
     displacements = np.zeros((len(motion), len(kept), 3))
     for n, (name, marker) in enumerate(kept.items()):
         source = marker.follows or name
-        if not marker.fixed and source in columns:  # one that was left out stays where it is
-            left = 1 - mapping.squint if marker.lid else 1.0  # to the lids of narrowed eyes
-            displacements[:, n] = left * marker.share * local[:, columns[source]]
-    # the head's motion about the point that the neutral markers' middle is laid onto
+        if not marker.fixed and source in columns:  # a marker that was left out stays in place
+            opening = 1 - mapping.squint if marker.lid else 1.0
+            displacements[:, n] = opening * marker.share * local[:, columns[source]]
+    # the head moves about the point onto which the middle of the neutral markers is laid
     middle, there = markers.neutral[placed].mean(axis=0), centres.mean(axis=0)
     rotation = turn @ markers.rotation @ turn.T
     from_middle = np.einsum("tij,j->ti", markers.rotation, middle) + markers.shift - middle
@@ -218,24 +207,24 @@ def _find_looking(head: MarkedHead, gaze: Gaze) -> tuple[Eye, ...]:
 
 
 def _measure_scale(head: MarkedHead, mapping: MarkerMapping, markers: SteadyMarkers, usual: float) -> float:
-    """Return the head's units per metre of the capture, by two fixed markers. usual: what all markers say."""
+    """Return the head's units per metre of the capture, by two fixed markers. usual: that by all markers."""
     pair = [name for name in mapping.scale if name in markers.names]
     if len(pair) < 2:
         pair = list(_farthest_fixed(head, mapping, markers))
-    own = [markers.neutral[markers.names.index(name)] for name in pair]
-    there = [head.vertices[mapping.markers[name].vertex or 0] for name in pair]
-    apart, wanted = (float(np.linalg.norm(a - b)) for a, b in (own, there))
+    captured = [markers.neutral[markers.names.index(name)] for name in pair]
+    placed = [head.vertices[mapping.markers[name].vertex or 0] for name in pair]
+    apart, wanted = (float(np.linalg.norm(a - b)) for a, b in (captured, placed))
     for length, points, what, unit in (
         (apart, markers.neutral, "markers", " m in the capture"),
         (wanted, head.vertices, "vertices", f" on {head.name}"),
     ):
-        if not length > TOGETHER * float(np.ptp(points, axis=0).max()):
+        if not length > MIN_DISTANCE * float(np.ptp(points, axis=0).max()):
             raise ModelError(
                 f"the {what} of {pair[0]!r} and {pair[1]!r}, which tell the scale, are at one place "
                 f"({length:.3g}{unit} apart): choose two fixed markers far from each other"
             )
     scale = wanted / apart
-    if not 1 / ODD_SCALE < scale / usual < ODD_SCALE:
+    if not 1 / MAX_SCALE_RATIO < scale / usual < MAX_SCALE_RATIO:
         warnings.warn(
             f"by {pair[0]} and {pair[1]} the head is {scale:.3g} times as large as the actor's, by all "
             f"markers {usual:.3g} times: are they where the mapping says?", FbaWarning, stacklevel=4,

@@ -1,4 +1,4 @@
-"""A first mapping, made from what is known of both: places of the markers, feature points of the head."""
+"""`propose_mapping`: a first mapping, by places of the markers and feature points of the head."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.markers._targets import HEAD, RIGID, target_points
+from fba.capture.markers._targets import LIDS, RIGID, SKULL, target_points
 from fba.capture.markers.marker_maps import find_map
 from fba.capture.markers.motion import MarkerMotion
-from fba.capture.virtual_markers._alignment import align
+from fba.capture.virtual_markers._alignment import lay_onto
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import lid_at, lid_height
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
@@ -18,24 +18,22 @@ from fba.errors import ModelError
 from fba.face.feature_points import row_of
 
 MIN_PLACES = 6
-"""Smallest number of markers whose places the head has, from which others are placed."""
+"""Smallest number of markers at places that the head has. They show where the other markers are."""
 MAX_POINT_DISTANCE = 0.015
 """Largest distance of a vertex from its feature point, in metres: a mask has no ears."""
 MAX_SKIN_DISTANCE = 0.03
-"""Distance from the skin, in metres, at which a marker without a place is left out."""
+"""Largest distance from the skin, in metres, of a marker without a place that gets a vertex."""
 NEIGHBOURS = 3
-"""Number of nearest other markers that a virtual marker reaches."""
+"""Number of nearest markers that a virtual marker reaches."""
 REACH = 1.2
 """Ratio of the radius to the distance of the farthest of these neighbours."""
 RADIUS_RANGE = (0.010, 0.045)
-"""Smallest and largest radius that is proposed, metres on a head of natural size."""
+"""Smallest and largest proposed radius, metres on a head of natural size."""
 FIRST_RADIUS = 0.03
-"""Metres, on a head of natural size, that the first virtual marker reaches."""
-LIDS = ("3.1", "3.2", "3.3", "3.4")
-"""Middles of lids."""
+"""Radius of the first virtual marker, metres on a head of natural size."""
 EYE_CORNERS = ("3.7", "3.11", "3.12", "3.8")
 LID_REACH = 0.8
-"""Share of the way to the nearer corner of the eye that a lid's radius is: a walk that reaches the corner
+"""Radius of a lid, as a share of the distance to the nearer corner of the eye: a walk that reaches the corner
 goes on to the other lid."""
 INNER_LIPS = {"2.2": "8.1", "2.3": "8.2", "2.6": "8.5", "2.7": "8.6", "2.8": "8.7", "2.9": "8.8"}
 """Feature points of the inner lips, and those of the outer lips that they follow."""
@@ -51,10 +49,10 @@ def propose_mapping(
     """Return virtual markers for a capture and a head.
 
     places: marker -> place on the face, as of `fba.capture.from_markers`; None to find them by names, or by
-    the cloud's shape. A marker at a feature point that the head has gets its vertex; one that the face does
-    not move is fixed. Others are laid onto the nearest skin between them, and some
-    virtual markers on inner lips follow captured ones. The radius reaches just beyond the
-    third nearest of the other markers; lids move by their rows, see `lids.find_rows`.
+    the cloud's shape. A marker at a feature point of the head gets its vertex; a marker that the face does
+    not move is fixed. Others are laid onto the nearest skin between them, and virtual markers on inner lips
+    follow captured markers. The radius reaches just beyond the third nearest marker; lids move by their rows,
+    see `lids.find_rows`.
 
     Raises ModelError where too few places are known.
     """
@@ -79,7 +77,7 @@ def propose_mapping(
     others += [
         name
         for name in fixed
-        if name not in vertices and places[name] not in targets and places[name] != HEAD
+        if name not in vertices and places[name] not in targets and places[name] != SKULL
     ]
     vertices |= _lay_others(motion, head, vertices, others)
     radii = _radii(head, vertices, places)
@@ -90,7 +88,7 @@ def propose_mapping(
             radius = round(lid_height(head, lid), 6) if lid else radii[name]
             markers[name] = VirtualMarker(vertices[name], radius, radius, name in fixed, lid=bool(lid))
     markers |= _find_companions(head, vertices, places, motion.names)
-    # what is on a cap, or where this head has no skin, still tells how the head moves
+    # markers on a cap, or where this head has no skin, still show how the head moves
     markers |= {
         name: VirtualMarker(None, fixed=True) for name in motion.names if name in fixed - set(vertices)
     }
@@ -98,7 +96,7 @@ def propose_mapping(
 
 
 def _known_targets(head: MarkedHead) -> dict[str, Float64]:
-    """Return where the places of markers are on a head, as far as it has them."""
+    """Return the positions of those places of markers that a head has."""
     return {name: at for name, at in target_points(head.points).items() if np.isfinite(at).all()}
 
 
@@ -109,21 +107,21 @@ def _on_skin(head: MarkedHead, vertex: int) -> bool:
 def _lay_others(
     motion: MarkerMotion, head: MarkedHead, vertices: Mapping[str, int], others: list[str]
 ) -> dict[str, int]:
-    """Return vertices for markers without a place, by where they are among those that have one."""
+    """Return vertices for markers without a place, by their positions among those with a vertex."""
     from scipy.interpolate import RBFInterpolator
 
     frame = _fullest_frame(motion, list(vertices))
     cloud = dict(zip(motion.names, motion.positions[frame], strict=True))
-    known = [name for name in vertices if np.isfinite(cloud[name]).all()]
+    placed = [name for name in vertices if np.isfinite(cloud[name]).all()]
     others = [name for name in others if np.isfinite(cloud[name]).all()]
-    if not others or len(known) < MIN_PLACES:
+    if not others or len(placed) < MIN_PLACES:
         return {}
-    there = head.vertices[[vertices[name] for name in known]]
-    own = np.array([cloud[name] for name in known])
-    fit = align(own, there)
-    laid = fit.place(own)
+    there = head.vertices[[vertices[name] for name in placed]]
+    points = np.array([cloud[name] for name in placed])
+    fit = lay_onto(points, there)
+    laid = fit.apply(points)
     field = RBFInterpolator(laid, there - laid, kernel="linear", degree=0)
-    wanted = fit.place(np.array([cloud[name] for name in others]))
+    wanted = fit.apply(np.array([cloud[name] for name in others]))
     wanted = wanted + field(wanted)
     result: dict[str, int] = {}
     for name, place in zip(others, wanted, strict=True):
@@ -159,7 +157,7 @@ def _radii(head: MarkedHead, vertices: Mapping[str, int], places: Mapping[str, s
 
 
 def usual_radius(mapping: MarkerMapping, head: MarkedHead) -> float:
-    """Return the radius that a new virtual marker gets, in the head's unit: the middle one of all."""
+    """Return the radius of a new virtual marker, in the head's unit: the median of all."""
     radii = [marker.radius for marker in mapping.centres.values()]
     return float(np.median(radii)) if radii else FIRST_RADIUS / head.metres
 
@@ -167,10 +165,10 @@ def usual_radius(mapping: MarkerMapping, head: MarkedHead) -> float:
 def _find_companions(
     head: MarkedHead, vertices: Mapping[str, int], places: Mapping[str, str], names: Collection[str]
 ) -> dict[str, VirtualMarker]:
-    """Return virtual markers that follow captured ones where no marker can be, by new names.
+    """Return virtual markers with new names that follow captured markers, where no marker can be.
 
     vertices: of captured markers on the head. places: marker -> place on the face. names: of all captured
-    markers. Inner lips go as far as the outer ones, unless captured markers are there.
+    markers. Inner lips move as far as the outer lips, unless captured markers are there.
     """
     at = {place: name for name, place in places.items() if name in vertices}
     found = _inner_lips(head, at) if not set(INNER_LIPS) & set(places.values()) else {}

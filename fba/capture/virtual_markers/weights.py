@@ -1,4 +1,4 @@
-"""How far each vertex of a head goes with each virtual marker."""
+"""`MarkerWeights`: how far each vertex of a head moves with each virtual marker."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from fba.capture.virtual_markers.influence import Influence, give_to_nearest
 from fba.capture.virtual_markers.lids import find_rows
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
 
-LEAST_DIRECTION = 0.05
-"""Combinations of markers that their overlapping reach hardly tells apart, relative to the clearest, are left
-out of the solution for `match`."""
+MIN_SINGULAR_VALUE = 0.05
+"""Smallest singular value of the overlap of markers, relative to the largest, that the solution of `match`
+uses: smaller ones belong to markers that their overlap hardly tells apart."""
 
 
 @dataclass(frozen=True, eq=False)
 class MarkerWeights:
     """The weights of K virtual markers.
 
-    names: of the markers. influences: what each moves, as vertices of the head's skin. shares: sparse float64
-    (N, K), by how much of each marker's displacement each vertex of the head moves. solve: float64 (K, K);
-    `shares @ (solve @ displacements)` is how far vertices move.
+    names: of the markers. influences: of each, as vertices of the head's skin. shares: sparse float64 (N, K),
+    of each marker's displacement in that of each vertex of the head. solve: float64 (K, K); vertices move by
+    `shares @ (solve @ displacements)`.
     """
 
     names: tuple[str, ...]
@@ -40,7 +40,7 @@ class MarkerWeights:
 
 
 def find_influences(head: MarkedHead, markers: Iterable[VirtualMarker]) -> list[Influence]:
-    """Return what virtual markers with a vertex move, each for itself, as vertices of the head's skin.
+    """Return the influence of each virtual marker with a vertex, as vertices of the head's skin.
 
     Errors as of `WalkedMesh.walk` and `find_rows`.
     """
@@ -56,7 +56,7 @@ def find_influences(head: MarkedHead, markers: Iterable[VirtualMarker]) -> list[
 def find_weights(head: MarkedHead, mapping: MarkerMapping) -> MarkerWeights:
     """Return the weights of all virtual markers that have a vertex, in their order.
 
-    What is not skin goes with it as `find_followers` says. Errors as of `find_influences`.
+    Parts that are not skin follow it, see `find_followers`. Errors as of `find_influences`.
     """
     from scipy.sparse import csr_array
 
@@ -73,5 +73,5 @@ def find_weights(head: MarkedHead, mapping: MarkerMapping) -> MarkerWeights:
     solve = np.eye(len(names))
     if mapping.overlap == "match" and names:
         overlap = on_skin[number[[each.vertex or 0 for each in markers.values()]]].toarray()
-        solve = np.linalg.pinv(overlap, rcond=LEAST_DIRECTION)
+        solve = np.linalg.pinv(overlap, rcond=MIN_SINGULAR_VALUE)
     return MarkerWeights(names, tuple(influences), (head.followers @ on_skin).tocsr(), solve)

@@ -107,7 +107,7 @@ def _report_face(
 ) -> dict[str, Any]:
     """Return the content of the capture of a face; see `_report`."""
     from fba.capture import MarkerMotion, make_animation
-    from fba.capture.markers.summary import summarise
+    from fba.capture.markers.marker_maps import summarise
     from fba.codec import StreamInfo
 
     assert reader.read_face is not None  # or there were no face
@@ -162,7 +162,7 @@ def _print_person(path: Path, size: int, person: PersonInfo) -> None:
 
 
 def _print_markers(capture: Mapping[str, Any]) -> None:
-    """Print the summary of a capture of markers, see `fba.capture.markers.summary`."""
+    """Print the summary of a capture of markers, see `fba.capture.markers.marker_maps`."""
     start = f" from {clock_text(capture['start'])}" if capture["start"] is not None else ""
     click.echo(
         f"  time     {capture['frames']} frames, {seconds_text(capture['seconds'])} at "

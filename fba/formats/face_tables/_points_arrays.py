@@ -15,7 +15,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import PointMotion
-from fba.capture.points.motion import COUNTS, OTHERS, check_count
+from fba.capture.points.motion import COUNTS, OTHER_TRACKERS, check_count
 from fba.errors import FormatError, Remedy
 from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables._tables import regular_seconds
@@ -72,7 +72,7 @@ def _choose(arrays: dict[str, Any], path: Path, face: str | None) -> Float64:
                 raise FormatError(f"has no face {face!r}; there are 0 to {faces - 1}", path=path)
             return points[:, number]
         shapes[name] = arrays[name].shape
-        if points is not None and points.shape[2] in OTHERS:
+        if points is not None and points.shape[2] in OTHER_TRACKERS:
             with naming_file(path):
                 check_count(points.shape[2])
     listed = ", ".join(f"{name} {shape}" for name, shape in list(shapes.items())[:6]) or "none of numbers"

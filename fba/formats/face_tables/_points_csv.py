@@ -16,7 +16,7 @@ import numpy as np
 
 from fba.arrays import Float64, Int64
 from fba.capture import PointMotion
-from fba.capture.points.motion import COUNTS, OTHERS, check_count
+from fba.capture.points.motion import COUNTS, OTHER_TRACKERS, check_count
 from fba.errors import FormatError, ModelError
 from fba.formats.face_tables._faces import choose_rows, row_times, tracked_rows
 from fba.formats.face_tables._points import build_points
@@ -161,7 +161,7 @@ def _read_wide(table: Table, rows: Int64) -> Float64:
         lacking = [f"{axis}_{number}" for number in _expected(numbers) if number not in chosen[axis]]
         if lacking:
             raise FormatError(f"columns are missing: {named(lacking)}", path=table.path, line=1)
-    if len(numbers) in (*OTHERS, 68, 70, 468, 478):
+    if len(numbers) in (*OTHER_TRACKERS, 68, 70, 468, 478):
         _check(len(numbers), table)
     columns = [[chosen[axis][number] for number in _expected(numbers)] for axis in axes]
     return np.stack([table.numbers(each)[rows] for each in columns], axis=2)

@@ -26,7 +26,7 @@ from fba.body.skeleton import ROOT
 from fba.body.skin.skin_weights import strongest_weights
 from fba.capture import SkeletonMotion
 from fba.capture.blendshapes.shape_table import amounts_of
-from fba.capture.rest import Rest, find_rest
+from fba.capture.preparation import Rest, find_rest
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices

@@ -11,9 +11,8 @@ from fba.formats.face_tables.shape_weights import check_weights
 from fba.live._protocols.sample import DatagramError, Sample
 
 PLACE = "the datagram"
-EMPTY = "empty"
-MAX_RATE = 240
-"""Frames a second; no phone's camera takes more."""
+MAX_CAMERA_RATE = 240
+"""Largest frame rate of phones' cameras, frames a second."""
 
 
 class LiveLinkReader:
@@ -26,24 +25,22 @@ class LiveLinkReader:
         """Return the sample of a datagram; see `DatagramReader`."""
         try:
             if not data:
-                raise DatagramError(EMPTY)
+                raise DatagramError("empty")
             packet, stop = read_packet(data, 0, PLACE)
             if packet is None:
                 raise DatagramError("cut short")
             if stop != len(data):
                 raise DatagramError("longer than a datagram of Live Link Face")
-            if packet.rate > MAX_RATE:
-                raise DatagramError(f"with more than {MAX_RATE} frames in a second")
+            if packet.rate > MAX_CAMERA_RATE:
+                raise DatagramError(f"with more than {MAX_CAMERA_RATE} frames in a second")
             (weights,), (head,), (eyes,) = divide_values(packet.values[None])
             seen = not np.isnan(packet.values).any()
             check_weights(weights[None], ARKIT_ORDER, PLACE)
         except UnsupportedError as error:
             raise DatagramError(f"of another kind: {error.what}") from error
         except FormatError as error:
-            weights_wrong = "weight" in str(error)
-            raise DatagramError(
-                "with weights outside 0 to 1" if weights_wrong else "not of Live Link Face"
-            ) from error
+            reason = "with weights outside 0 to 1" if "weight" in str(error) else "not of Live Link Face"
+            raise DatagramError(reason) from error
         device, subject = packet.sender
         self._newest = Sample(
             packet.seconds, ARKIT_ORDER, weights if seen else None, head, eyes,

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Float64
 from fba.formats.gltf.humanoid import OLD_THUMB, joints_of_bones
+from fba.source import read_table
 
-TO_OURS = np.array([-1.0, 1.0, 1.0])
+TO_OUR_AXES = np.array([-1.0, 1.0, 1.0])
 """Factors of a position: Unity's x points to the subject's right, ours to the left."""
 
 
@@ -19,10 +18,17 @@ TO_OURS = np.array([-1.0, 1.0, 1.0])
 def parents() -> dict[str, str]:
     """Return the parent of each bone, "" for the hips; parents come first."""
     result: dict[str, str] = {}
-    text = (files(__package__) / "unity_bones.csv").read_text(encoding="utf-8")
-    for row in csv.DictReader(text.splitlines()):
+    for row in read_table(__package__, "unity_bones.csv"):
         for side in ("Left", "Right") if "?" in row["bone"] else ("",):
             result[row["bone"].replace("?", side)] = row["parent"].replace("?", side)
+    return result
+
+
+def above(bone: str) -> list[str]:
+    """Return the bones above a bone, the nearest first."""
+    result = []
+    while bone := parents()[bone]:
+        result.append(bone)
     return result
 
 
@@ -38,7 +44,7 @@ def joint_of(bone: str) -> str | None:
 
 def position(numbers: Float64) -> Float64:
     """Return a position (3,) in our axes, y up and right-handed, for a position in Unity's."""
-    result: Float64 = numbers * TO_OURS
+    result: Float64 = numbers * TO_OUR_AXES
     return result
 
 

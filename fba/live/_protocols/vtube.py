@@ -18,7 +18,7 @@ from fba.live._protocols.sample import DatagramError, Sample
 
 MIN_SHAPES = 5
 """Smallest number of shapes with ARKit's names in an object with a face."""
-NO_OBJECTS = "not objects of VTube Studio"
+NOT_OBJECTS = "not objects of VTube Studio"
 MAX_ANGLE = 360.0
 MAX_TIME = 1e15
 
@@ -35,9 +35,9 @@ class VTubeReader:
         try:
             content = json.loads(data)
         except (ValueError, RecursionError) as error:
-            raise DatagramError(NO_OBJECTS) from error
+            raise DatagramError(NOT_OBJECTS) from error
         if not isinstance(content, dict) or not isinstance(content.get("FaceFound"), bool):
-            raise DatagramError(NO_OBJECTS)
+            raise DatagramError(NOT_OBJECTS)
         stamp = _number(content.get("Timestamp"))
         if not 0 <= stamp <= MAX_TIME:
             raise DatagramError("without a time")
@@ -72,7 +72,7 @@ def _weights(entries: Any) -> dict[str, float]:
         if shape is not None:
             weights[shape] = _number(entry.get("v"))
     if len(weights) < MIN_SHAPES:
-        raise DatagramError(NO_OBJECTS)
+        raise DatagramError(NOT_OBJECTS)
     try:
         check_weights(np.array([list(weights.values())]), list(weights), "the object")
     except FormatError as error:

@@ -115,7 +115,7 @@ def test_a_table_that_is_written_reads_back(tmp_path: Path) -> None:
         np.testing.assert_allclose(read.times, np.arange(COUNT) / float(exact), atol=2e-5)
 
 
-def test_what_cannot_be_written(tmp_path: Path) -> None:
+def test_animations_that_no_table_can_hold_are_refused(tmp_path: Path) -> None:
     body = Animation(25, np.arange(2), None, fba.BodyTrack(np.zeros((2, 296), int), np.ones((2, 296), bool)))
     with pytest.raises(ModelError, match="has no face"):
         to_blendshapes(body)

@@ -72,7 +72,7 @@ def test_values_between_rows_and_rates() -> None:
     assert shown(animation, "thrust_jaw") == [80, 120]
 
 
-def test_what_cannot_be_made() -> None:
+def test_captures_without_faces_or_shapes_are_refused() -> None:
     with pytest.raises(ModelError, match="no face is seen in any of the 2 rows"):
         from_blendshapes(motion(jawOpen=[np.nan, np.nan]))
     with pytest.raises(ModelError, match=r"no name of a shape is known here: 'Wobble', 'Wiggle'; expected"):
@@ -85,7 +85,7 @@ def test_what_cannot_be_made() -> None:
         from_blendshapes(motion(jawOpen=0.5), -5)
 
 
-def test_motions_that_are_none() -> None:
+def test_wrong_motions_are_refused() -> None:
     times = np.arange(2.0)
     with pytest.raises(ModelError, match=r"weights has shape \(2, 3\), not \(2, 1\)"):
         ShapeMotion(("jawOpen",), np.zeros((2, 3)), times, Fraction(1))

@@ -143,7 +143,7 @@ def test_out_of_order_doubled_lost_and_without_a_face(tmp_path: Path) -> None:
         (datagram([0.1] * 61, 1.0, rate=900), "with more than 240 frames in a second"),
     ],
 )
-def test_what_is_no_datagram_of_the_capture_is_counted(data: bytes, reason: str, tmp_path: Path) -> None:
+def test_datagrams_of_others_are_counted(data: bytes, reason: str, tmp_path: Path) -> None:
     live, summary = captured("livelink", at_rate([data, *SENT[:20], data, *SENT[20:], data]))
     check_same(live, from_file(tmp_path, b"".join(SENT)))
     assert dict(summary.refused) == {reason: 3}
@@ -290,7 +290,7 @@ def test_objects_of_vtube_studio() -> None:
     assert dict(summary.refused) == {"not objects of VTube Studio": 6, "without a time": 1}
 
 
-def test_what_is_shown_is_the_newest_datagram() -> None:
+def test_the_newest_datagram_is_shown() -> None:
     capture = Capture(find_kind("livelink"), lambda _frames: None)
     assert capture.newest() == (None, None)
     for row, data in enumerate([*SENT[:9], datagram(None, 18_000 + 9 * STEP)]):
@@ -343,7 +343,7 @@ def test_the_summary_says_everything_once() -> None:
     assert summary.values()["refused"] == {"cut short": 1}
 
 
-def test_what_is_sent_again_and_again() -> None:
+def test_a_face_is_sent_again_and_again() -> None:
     now, sent = [0.0], []
 
     def sleep(seconds: float) -> None:

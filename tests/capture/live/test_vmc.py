@@ -162,7 +162,7 @@ def test_a_face_alone_turns_its_head_by_the_bones_of_the_neck() -> None:
     assert yaw == pytest.approx(-30_000, abs=700)  # Unity turns to the right
 
 
-def test_bones_that_are_no_body() -> None:
+def test_bones_of_no_body() -> None:
     hips = [osc("/VMC/Ext/Bone/Pos", name, *(0.0,) * 6, 1.0) for name in ("Hips", "Head")]
     animation, summary = captured("vmc", [(0.0, "10.0.0.5", bundle(osc("/VMC/Ext/T", 1.0), *hips)),
                                           (0.1, "10.0.0.5", osc("/VMC/Ext/T", 2.0))])  # fmt: skip
@@ -230,7 +230,7 @@ def test_other_senders(options: dict[str, bool], person: fba.Animation) -> None:
         (osc("/VMC/Ext/T", "now"), "with wrong messages of VMC"),
     ],
 )
-def test_what_is_damaged_is_counted(data: bytes, reason: str) -> None:
+def test_damaged_messages_are_refused(data: bytes, reason: str) -> None:
     with pytest.raises(DatagramError, match=reason):
         VmcReader().read(data, 0.0)
 

@@ -162,7 +162,7 @@ def test_a_person_whose_left_is_called_right_is_refused(name: str) -> None:
         from_skeleton(parse(text))
 
 
-def test_toes_of_another_name_than_the_familys() -> None:
+def test_toes_with_another_name_than_the_family_has() -> None:
     """LaFAN1 calls the toes "LeftToe", where others of its family say "LeftToeBase"."""
     toes = replace(MAKERS[2], parts=(*MIXAMO[:-2], "{}Foot", "{}Toe"))
     found = find_bones(parse(write(toes)[0]), None, Skeleton.default())
@@ -186,7 +186,7 @@ def test_there_are_thirty_makers() -> None:
 
 
 @pytest.mark.parametrize("maker", MAKERS, ids=lambda maker: maker.name)
-def test_a_person_comes_back_as_it_was(maker: Maker) -> None:
+def test_a_person_is_restored(maker: Maker) -> None:
     wanted, names = truth()
     text, joints = write(maker)
     animation = from_skeleton(parse(text))

@@ -11,7 +11,7 @@ import fba
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture import ActionUnitMotion, from_action_units
-from fba.capture.action_units.conversion import unit_shapes
+from fba.capture.blendshapes.action_units import unit_shapes
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats import format_of

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.capture.markers._responses import JAW, JAW_VALUES, measure_responses
+from fba.capture.markers._solving import JAW, JAW_VALUES, measure_responses
 from fba.errors import ModelError
 from fba.face import FaceModel, Fapu, FeaturePointFace, neutral_points
 from fba.face.feature_points import MIRRORED, row_of

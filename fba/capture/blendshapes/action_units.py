@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.animation import Animation
-from fba.capture.action_units._motion import ActionUnitMotion
-from fba.capture.blendshapes._motion import ShapeMotion
+from fba.capture.blendshapes._motion import ActionUnitMotion, ShapeMotion
 from fba.capture.blendshapes.conversion import from_blendshapes
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.source import read_table
 
 
 def from_action_units(
@@ -51,9 +49,8 @@ def to_shapes(motion: ActionUnitMotion) -> ShapeMotion:
 @cache
 def unit_shapes() -> dict[int, Mapping[str, float]]:
     """Return weights of ARKit's shapes by name, for each action unit at full intensity, by its number."""
-    text = (files(__package__) / "unit_shapes.csv").read_text(encoding="utf-8")
     table: dict[int, Mapping[str, float]] = {}
-    for row in csv.DictReader(text.splitlines()):
+    for row in read_table(__package__, "unit_shapes.csv"):
         shapes = {}
         for entry in row["shapes"].split():
             name, _, share = entry.partition("=")

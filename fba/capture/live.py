@@ -1,25 +1,40 @@
-"""`LiveBlendshapes`: what `from_blendshapes` does, for rows that come one by one."""
+"""Captures that arrive moment by moment: the conversions of whole captures, a frame at a time.
+
+May use: all of `fba.capture`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from math import ceil, floor
 
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64
+from fba.arrays import Float64, Int32
+from fba.body import BapSolver
+from fba.capture import _retarget as retarget
 from fba.capture.blendshapes.combination import RADIAN
-from fba.capture.blendshapes.conversion import EYES, HEAD, convert_rows
+from fba.capture.blendshapes.conversion import EYE_FAPS, HEAD_FAPS, convert_rows
 from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of, largest_amounts
+from fba.capture.motion import SkeletonMotion
+from fba.capture.preparation import prepare, rest_on_frame
 from fba.capture.sampling import TIME_TOLERANCE, interpolate
+from fba.capture.skeleton import solve_targets
 from fba.limits import DEFAULT_LIMITS
 from fba.parameters import FAP_COUNT, fap_numbers
-from fba.tracks import FaceTrack
+from fba.tracks import BodyTrack, FaceTrack
 
-CHUNK = 4096
-"""Frames that are made at once, which limits the memory for those of a long gap."""
+__all__ = ["LiveBlendshapes", "LiveSkeleton", "widest_faces"]
+
+CHUNK_FRAMES = 4096
+"""Number of frames that are made at once, which limits the memory for those of a long gap."""
+CONTEXT_FRAMES = 8
+"""Number of earlier frames that are converted again with the new ones, so that joints move on smoothly."""
+LIVE_OPTIONS = retarget.SkeletonOptions(ground="none", plant=False)
+"""Options of poses that come one after another: where the ground is, only later poses show."""
 
 Row = tuple[float, list[Float64]]
 """A time, and what is there then: weights (N,), angles of the head (3,) and of the eyes (4,)."""
@@ -33,7 +48,7 @@ def widest_faces() -> Animation:
     shapes = np.array([amounts for name in ARKIT_ORDER if (amounts := amounts_of(name)) is not None])
     most = np.maximum(np.maximum(shapes, 0.0).sum(axis=0), largest_amounts())
     least = np.minimum(np.minimum(shapes, 0.0).sum(axis=0), -largest_amounts())
-    turns = [fap_numbers()[name] - 1 for name in (*HEAD, *EYES)]
+    turns = [fap_numbers()[name] - 1 for name in (*HEAD_FAPS, *EYE_FAPS)]
     most[turns], least[turns] = RADIAN, -RADIAN
     still = np.zeros(FAP_COUNT)
     values = np.rint([still, most, still, least, still]).astype(np.int32)
@@ -101,7 +116,7 @@ class LiveBlendshapes:
         times = np.array([time for time, _ in rows])
         values = [np.stack(parts) for parts in zip(*(parts for _, parts in rows), strict=True)]
         while self._next <= last:
-            index = np.arange(self._next, min(last + 1, self._next + CHUNK))
+            index = np.arange(self._next, min(last + 1, self._next + CHUNK_FRAMES))
             self._next += len(index)
             self._frames_made = True
             track = self._convert(interpolate(times, values, index / float(self.rate), DEFAULT_LIMITS))
@@ -111,3 +126,46 @@ class LiveBlendshapes:
         weights, head, eyes = values
         with_head, with_eyes = self._recorded
         return convert_rows(self.names, weights, head if with_head else None, eyes if with_eyes else None)
+
+
+class LiveSkeleton:
+    """Turns poses of a skeleton into BAPs as they come.
+
+    motion: of one frame at least, y up; its joints are the skeleton. Its rest pose counts, or, with t_pose,
+    its first frame. Bones point in the directions of the source's, as `from_skeleton` with ground "none" has
+    it: feet are not planted, since that needs what comes later.
+
+    Raises ModelError where it is not clear which joint is which, or which side is left.
+    """
+
+    def __init__(self, motion: SkeletonMotion, *, t_pose: bool = False) -> None:
+        self._source = motion
+        self._t_pose = t_pose
+        self._solver = BapSolver()
+        ready = prepare(self._at_rest(motion), self._solver.skeleton, rest="file", up="+y")
+        self._mapped = ready.mapped
+        self._context: tuple[Float64, Float64] | None = None
+        self._previous: Int32 | None = None
+        self.convert(motion.rotations[:1], motion.positions[:1], motion.rate)  # or it fails now
+        self._context = self._previous = None
+
+    def convert(self, rotations: Float64, positions: Float64, rate: Fraction) -> BodyTrack:
+        """Return the BAPs of the next poses.
+
+        rotations: (T, J, 4), quaternions relative to the parents, positions: (T, 3), of the root, as in the
+        motion that this was made from. A few poses at once take hardly longer than one.
+        """
+        new = len(positions)
+        if self._context is not None:
+            rotations = np.concatenate([self._context[0], rotations])
+            positions = np.concatenate([self._context[1], positions])
+        self._context = rotations[-CONTEXT_FRAMES:], positions[-CONTEXT_FRAMES:]
+        poses = replace(self._source, rotations=rotations, positions=positions, rate=rate)
+        turned, root = retarget.find_targets(self._at_rest(poses), self._mapped, self._solver, LIVE_OPTIONS)
+        last = {joint: rows[-new:] for joint, rows in turned.items()}
+        track = solve_targets(last, root[-new:], self._solver, self._previous)
+        self._previous = track.values[-1]
+        return track
+
+    def _at_rest(self, poses: SkeletonMotion) -> SkeletonMotion:
+        return rest_on_frame(poses, self._source, 0) if self._t_pose else poses
