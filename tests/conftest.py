@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 import graphics
 from ready_programs import ready_programs
@@ -17,11 +18,13 @@ HERE = Path(__file__).parent
 
 
 def pytest_configure() -> None:
-    """Look for garbage less often, which saves 4 % of the time.
+    """Let Hypothesis take any time, as machines are slow; look for garbage less often, which saves 4 % of it.
 
     Not as rarely as the program does (`fba.cli.startup`): errors keep their decoder, and tests of damage make
     thousands, which filled 9 GB.
     """
+    settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    settings.load_profile("any machine")
     gc.set_threshold(2_000)
 
 

@@ -281,7 +281,7 @@ def test_rates_of_many_digits() -> None:
 
 
 @given(st.integers(1, 20), st.fractions("1/4", 100), st.fractions("1/4", 100), st.integers(-50, 50))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_resampled_times_lie_within(count: int, rate: Fraction, wanted: Fraction, start: int) -> None:
     source = animation(count, start, rate)
     got = source.resample(wanted)

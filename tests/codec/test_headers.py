@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from codec_streams import BAP_GROUPS, FAP_GROUP_SIZES
@@ -123,7 +123,7 @@ def resting() -> Animation:
 
 
 @given(plane_settings(True), plane_settings(False))
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40)
 def test_the_independent_reader_reads_the_written_elements(one: PlaneSettings, two: PlaneSettings) -> None:
     data = encode_planes(resting(), [one, two])
     elements = list(trace(data))
@@ -167,7 +167,7 @@ def same_codes(
 
 
 @given(plane_settings(True), plane_settings(False))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60)
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")  # time codes that go back, rates that change
 def test_the_decoder_reports_what_was_written(one: PlaneSettings, two: PlaneSettings) -> None:
     decoder = Decoder()

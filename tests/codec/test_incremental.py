@@ -72,7 +72,7 @@ def test_small_chunks(name: str, chunk: int) -> None:
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_chunks(data: st.DataObject) -> None:
     """Empty chunks too, of any type of bytes."""
     coded = stream(data.draw(st.sampled_from(EVERY)))
@@ -87,7 +87,7 @@ def test_any_chunks(data: st.DataObject) -> None:
 
 
 @given(st.data())
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_the_same_error_whatever_the_chunks(data: st.DataObject) -> None:
     coded = bytearray(stream(data.draw(st.sampled_from(EVERY))))
     at = data.draw(st.integers(4, len(coded) - 1))
@@ -187,7 +187,7 @@ def test_memory_stays_flat(mode: str) -> None:
 
 
 @given(st.sampled_from(EVERY), st.integers(0, 31), st.integers(0, 31), st.booleans())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_encoder_frame_by_frame(name: str, fap_quant: int, bap_quant: int, start_codes: bool) -> None:
     """An encoder that does not know what comes next makes other planes, but the same values.
 

@@ -62,7 +62,7 @@ def test_the_largest_value(table: str, part: str, numbers: tuple[int, ...], quan
     st.integers(1, 700_000),
     st.sampled_from(["iso", "visage"]),
 )
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 def test_the_recommended_quantiser_suffices(
     parameter: tuple[str, int], quant: int, value: int, table: str
 ) -> None:

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from codec_streams import animations, steps
@@ -38,7 +38,7 @@ def check_amounts(source: npt.NDArray[np.int16], got: npt.NDArray[np.int16], qua
 
 
 @given(st.data(), QUANTS, QUANTS, PERIODS, st.booleans(), st.sampled_from(["keep", "interpolate"]))
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150)
 def test_any_animation(
     data: st.DataObject,
     fap_quant: int,
@@ -74,7 +74,7 @@ def test_any_animation(
 
 
 @given(st.data(), QUANTS, QUANTS, PERIODS)
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=12)
 def test_the_independent_reader_agrees(
     data: st.DataObject, fap_quant: int, bap_quant: int, period: Fraction | None
 ) -> None:

@@ -24,7 +24,6 @@ NTSC = Fraction(1000, 1001)
 
 
 @given(RATES)
-@settings(deadline=None)
 def test_every_rate_of_the_syntax(rate: Fraction) -> None:
     face = motion.face(2, faps_sent=(3,))
     frames, error, _ = decoded(encode(motion.animation(face, rate=rate)))
@@ -271,7 +270,7 @@ def test_a_stream_without_a_rate() -> None:
 
 
 @given(st.lists(RATES, min_size=1, max_size=6), st.lists(st.integers(0, 40), min_size=6, max_size=6))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_changes_of_rate(rates: list[Fraction], skips: list[int]) -> None:
     """Every plane's time is the sum of the periods before it, and the animation's times are near and rise."""
     planes = [

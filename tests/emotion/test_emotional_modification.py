@@ -183,7 +183,7 @@ def test_bodies_visemes_and_what_is_not_sent_stay() -> None:
     assert not emote(performance([{31: 1}]), [Mood("anger", 5)]).face.mask[:, tongue].any()  # type: ignore[union-attr]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(0, 2**32 - 1),
     st.lists(st.tuples(st.sampled_from([one.name for one in expressions()]), st.integers(0, 100)), min_size=1,

@@ -51,7 +51,7 @@ def test_cut_at_every_byte(tmp_path: Path) -> None:
     assert frames[-1] == 3
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.binary(max_size=300)
     | st.text(max_size=300).map(str.encode)

@@ -39,7 +39,7 @@ def ranges(axes: str) -> np.ndarray:
     return result
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(convention_names()), st.floats(0.0, 1.0))
 def test_random_poses_within_human_limits_come_back(seed: int, axes: str, reach: float) -> None:
     generator = np.random.default_rng(seed)
@@ -55,7 +55,7 @@ def test_random_poses_within_human_limits_come_back(seed: int, axes: str, reach:
         assert np.abs(solver.solve(frame) - row).max() <= 1
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.integers(0, 2**32 - 1),
     st.sampled_from([0, 1, 2, 5, 20, 100, 300]),
@@ -75,7 +75,7 @@ def test_same_rotations_at_and_near_gimbal_lock(seed: int, off: int, axes: str) 
         assert turn.max() < 1e-4, solver.skeleton.names[joint]
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_smooth_motions_stay_smooth(seed: int) -> None:
     """Angles that swing through several turns come back as they were, without a jump or a flip."""
@@ -122,7 +122,6 @@ def test_frames_one_by_one_are_frames_together() -> None:
         assert np.abs(row - together[number]).max() <= 1
 
 
-@settings(deadline=None)
 @given(st.floats(-21475.0, 21475.0))
 def test_sine_and_cosine(angle: float) -> None:
     sine, cosine = sine_cosine(angle)
@@ -130,7 +129,6 @@ def test_sine_and_cosine(angle: float) -> None:
     assert cosine == pytest.approx(math.cos(angle), abs=3e-16)
 
 
-@settings(deadline=None)
 @given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_arc_tangent(y: float, x: float) -> None:
     assume(max(abs(x), abs(y)) > 1e-300)

@@ -171,7 +171,7 @@ def plainly(model: FaceModel, vector: np.ndarray, size: Callable[[int], float] =
 
 
 @given(model=models(), seed=st.integers(0, 2**32 - 1), flat=st.booleans())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_equals_a_plain_evaluation(model: FaceModel, seed: int, flat: bool) -> None:
     frames = np.random.default_rng(seed).integers(-1200, 1200, (3, 68))
     frames[1] *= np.random.default_rng(seed).random(68) < 0.2

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from test_storage_hostile import CASES
 
 from fba.face.gltf._storage import build
@@ -54,7 +54,7 @@ def test_a_face_follows_the_schema() -> None:
     assert set(content) == set(SCHEMA["properties"])
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25)
 @given(models())
 def test_every_face_follows_the_schema(model: FaceModel) -> None:
     validator().validate(written(model))

@@ -29,11 +29,7 @@ def test_a_face_comes_back_as_it_was(tmp_path: Path) -> None:
     assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
 
 
-@settings(
-    max_examples=60,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(models())
 def test_any_face_comes_back_as_it_was(tmp_path: Path, model: FaceModel) -> None:
     model.save(tmp_path / "a.glb")

@@ -440,7 +440,7 @@ JSON = st.recursive(
 
 
 @given(JSON)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_any_json_is_read_or_refused(data: object) -> None:
     try:
         table = InterpolationTable.from_dict(data)
@@ -450,7 +450,7 @@ def test_any_json_is_read_or_refused(data: object) -> None:
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_any_node_is_read_or_refused(data: st.DataObject) -> None:
     node = copy.deepcopy(NODE)
     for _ in range(data.draw(st.integers(1, 3))):

@@ -167,7 +167,7 @@ def tracks(draw: st.DrawFn) -> FaceTrack:
 
 
 @given(tracks(), st.data())
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_pieces_give_what_the_whole_gives(whole: FaceTrack, data: st.DataObject) -> None:
     face = everything()
     borders = sorted(data.draw(st.lists(st.integers(0, len(whole)), max_size=6)))
@@ -183,7 +183,7 @@ def test_pieces_give_what_the_whole_gives(whole: FaceTrack, data: st.DataObject)
 
 
 @given(tracks())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_sent_values_show_as_they_are(whole: FaceTrack) -> None:
     faps = resolve(whole, everything())
     plain = (whole.mask[:, 2:]) & ~(np.maximum.accumulate(whole.expression[:, 4:5], axis=0) == 1)

@@ -63,7 +63,7 @@ def test_errors_name_the_bap(tmp_path: Path) -> None:
         read_bap(path)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(animations(face=False, body=True))
 def test_written_files_read_back_unchanged(animation) -> None:  # type: ignore[no-untyped-def]
     with tempfile.TemporaryDirectory() as folder:

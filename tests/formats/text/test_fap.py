@@ -204,7 +204,7 @@ def test_the_written_form_is_the_canonical_one(tmp_path: Path) -> None:
     assert (tmp_path / "b.fap").read_text() == f"2.2 a b 25 1\n{mask(1, 3)}\n7 1 2 3 0 -5\n"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(animations())
 def test_written_files_read_back_unchanged(animation: Animation) -> None:
     with tempfile.TemporaryDirectory() as folder:

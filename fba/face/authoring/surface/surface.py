@@ -125,7 +125,7 @@ class Surface:
         return np.asarray(dijkstra(self.graph, directed=False, indices=start, limit=limit, min_only=True))
 
     def path(self, start: int, end: int, *, rim: bool = False, costs: Float64 | None = None) -> Intp:
-        """Return the vertices of the shortest path along edges, with both ends; empty if there is none.
+        """Return the vertices of the shortest path along edges, with both ends; empty without a path.
 
         rim: prefer open edges, as of a mouth that is a slit or eyes that are holes. costs: (N,), factors of
         the lengths of edges at each vertex, 1 or more; the larger one of both ends counts.
