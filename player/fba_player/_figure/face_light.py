@@ -266,7 +266,11 @@ def _light_vertices(table: Table, basis: Float32, wide: float, added: float, lig
 
 @compiled
 def _blend_swaying(light: Float32, still: Float32, rows: Intp, share: Float32) -> None:
-    """Blend rows of light (N, 4) with `still` (M, 4), that at rest, by shares (M,) of the head's motion."""
+    """Blend rows of light (N, 4) with `still` (M, 4), that at rest, by shares (M,) of the head's motion.
+
+    Bounds: rows are numbers of vertices of the part, which light has a row for each of; still and share are
+    made for them.
+    """
     for k in range(len(rows)):
         for column in range(4):
             light[rows[k], column] = still[k, column] + share[k] * (light[rows[k], column] - still[k, column])
@@ -276,7 +280,11 @@ def _blend_swaying(light: Float32, still: Float32, rows: Intp, share: Float32) -
 def _products(
     light: Float32, through: Float32, basis: Float32, count: int
 ) -> tuple[Float32, Float32, Float32]:
-    """Return key light, rim light, and rim light through the skin, each (count,)."""
+    """Return key light, rim light, and rim light through the skin, each (count,).
+
+    Bounds: light and through (16, count) are those of a table, whose columns are its vertices; basis is
+    (2, 16).
+    """
     key = np.zeros(count, dtype=np.float32)
     rim, back = np.zeros_like(key), np.zeros_like(key)
     for k in range(0, basis.shape[1], 4):  # four at a time: the sums are read and written less often
