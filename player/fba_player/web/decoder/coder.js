@@ -87,6 +87,8 @@ export class Models {
    * @param {Int32Array} symbols filled from `first` to `stop`
    */
   decodeSegment(data, bit, end, slots, first, stop, adaptive, symbols) {
+    const totals = adaptive ? this._total : this.intraSize;
+    const [added, tree] = [this._added, this._tree];
     let low = 0;
     let high = 0;
     let code = 0; // so that renormalising reads the first 16 bits
@@ -128,7 +130,7 @@ export class Models {
       if (position === stop) break;
       const slot = slots[position];
       const span = high - low + 1;
-      const total = adaptive ? this._total[slot] : this.intraSize[slot];
+      const total = totals[slot];
       const target = total - 1 - ((((code - low + 1) * total - 1) / span) | 0); // counted from symbol 0 upwards
       let symbol = target;
       let below = target;
@@ -137,7 +139,7 @@ export class Models {
         const row = slot * STRIDE;
         symbol = this._usual[slot];
         below = this._belowUsual[slot];
-        share = 1 + this._added[row + symbol];
+        share = 1 + added[row + symbol];
         if (target < below || target >= below + share) {
           const behind = target < below ? 0 : share - 1;
           let remaining = target - behind;
@@ -146,14 +148,14 @@ export class Models {
           for (let step = TREE_TOP; step > 0; step >>= 1) {
             const node = symbol + step;
             if (node > size) continue;
-            const weight = step + this._tree[row + node];
+            const weight = step + tree[row + node];
             if (weight <= remaining) {
               symbol = node;
               remaining -= weight;
             }
           }
           below = target - remaining;
-          share = 1 + this._added[row + symbol];
+          share = 1 + added[row + symbol];
         }
       }
       symbols[position] = symbol;
