@@ -1,4 +1,4 @@
-"""Write the tables of the decoder in JavaScript, from those of `fba.parameters`: `python tools/web/make_tables.py`."""
+"""Write the tables of the decoder in JavaScript: `python tools/web/make_tables.py`."""
 
 from __future__ import annotations
 
