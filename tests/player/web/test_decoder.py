@@ -1,0 +1,133 @@
+"""The decoder in JavaScript finds in every stream what the one in Python finds."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import struct
+import subprocess
+from collections.abc import Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+
+import fba
+from fba.animation import Animation
+from fba.codec import Decoder, decode
+from fba.codec._decoder import read_blocks, reader_for
+from fba.errors import BitstreamError, FbaError
+from fba.limits import DEFAULT_LIMITS
+from fba_conformance.suite.index import read_vectors
+from tools.fuzz._engine import mutated
+from tools.fuzz.corpus import read_corpus
+from tools.fuzz.targets import find_target
+from tools.web import make_tables
+
+needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
+MUTANTS = 150
+LONGEST_BYTEWISE = 120
+"""Bytes of a stream that is also pushed byte by byte: longer ones take their time in Python."""
+pytestmark = pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+
+
+def test_its_tables_are_those_of_the_standard() -> None:
+    assert make_tables.TARGET.read_text(encoding="utf-8") == make_tables.make_tables()
+
+
+@needs_node
+def test_vectors(tmp_path: Path) -> None:
+    _compare([vector.data() for vector in read_vectors()], tmp_path)
+
+
+@needs_node
+def test_damaged_streams(tmp_path: Path) -> None:
+    target = find_target("stream")
+    corpus = read_corpus(target)
+    _compare([mutated(target, corpus, 27, number)[0] for number in range(MUTANTS)], tmp_path)
+
+
+def _compare(streams: Sequence[bytes], folder: Path) -> None:
+    """Decode streams whole, salvaging and byte by byte, with both decoders; fail where they differ."""
+    file = folder / "streams"
+    file.write_bytes(b"".join(struct.pack(">I", len(stream)) + stream for stream in streams))
+    program = str(Path(__file__).with_name("decode_streams.mjs"))
+    done = subprocess.run(
+        ["node", program, file, str(LONGEST_BYTEWISE)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    for number, (stream, line) in enumerate(zip(streams, done.stdout.splitlines(), strict=True)):
+        found = json.loads(line)
+        for name, salvage in (("strict", False), ("salvaged", True)):
+            assert found[name] == _outcome(stream, salvage), f"stream {number}, {name}"
+        assert found["bytewise"] == _bytewise(stream), f"stream {number}, byte by byte"
+
+
+def _outcome(stream: bytes, salvage: bool) -> dict[str, Any]:
+    on_error: Literal["raise", "salvage"] = "salvage" if salvage else "raise"
+    try:
+        animation = decode(stream, on_error=on_error)
+    except FbaError as error:
+        return _error(error)
+    reader = reader_for(memoryview(stream), bap_steps=None, on_error=on_error, limits=DEFAULT_LIMITS)
+    reader.times.may_step_back = True
+    for _ in read_blocks(reader, memoryview(stream)):
+        pass
+    return {
+        "rate": str(animation.rate),
+        "index": animation.index.tolist(),
+        "values": _digest(animation),
+        "mark": reader.objects.mark,
+        "damage": [
+            [
+                one.start, one.stop, one.frames_lost, one.uncertainty,
+                [one.doubtful.start, one.doubtful.stop] if one.doubtful else None,
+                *[_error(one.error)[key] for key in ("plane", "bit", "error")],
+            ]
+            for one in reader.damage
+        ],
+    }  # fmt: skip
+
+
+def _bytewise(stream: bytes) -> dict[str, Any] | None:
+    if len(stream) > LONGEST_BYTEWISE:
+        return None
+    decoder = Decoder()
+    frames: list[fba.Frame] = []
+    error = None
+    try:
+        for at in range(len(stream)):
+            frames += decoder.push(stream[at : at + 1])
+        frames += decoder.finish()
+    except FbaError as raised:
+        frames += [frame for block in getattr(raised, "blocks", ()) for frame in block.frames()]
+        error = _error(raised)["error"]
+    rows = b"".join(_rows(frame).tobytes() for frame in frames)
+    return {"frames": len(frames), "values": sha256(rows).hexdigest(), "error": error}
+
+
+def _error(error: Exception) -> dict[str, Any]:
+    text = error.message if isinstance(error, BitstreamError) else str(error).split(": ", 1)[-1]
+    text = text.partition("; it seems")[0]  # kinds of other files and names of parameters: Python's alone
+    text = re.sub(r"^(FAP|BAP) (\d+) (?!viseme_|expression_)\w+ (is sent|gets)", r"\1 \2 \3", text)
+    return {"error": text, "plane": getattr(error, "plane", None), "bit": getattr(error, "bit", None)}
+
+
+def _digest(animation: Animation) -> str:
+    return sha256(_rows(animation).tobytes()).hexdigest()
+
+
+def _rows(frames: Animation | fba.Frame) -> np.ndarray[Any, Any]:
+    """Return all that frames send, int32 (T, 806)."""
+    face, body = frames.face, frames.body
+    count = len(face if face is not None else body or [0])
+    rows = np.zeros((count, 806), dtype="<i4")
+    if face is not None:
+        interpolated = np.zeros_like(face.mask) if face.interpolated is None else face.interpolated
+        rows[:, :214] = np.hstack([face.values, face.mask, interpolated, face.viseme, face.expression])
+    if body is not None:
+        rows[:, 214:] = np.hstack([body.values, body.mask])
+    return rows
