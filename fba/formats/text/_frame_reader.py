@@ -16,7 +16,7 @@ from fba.arrays import Bool, Int32, Int64
 from fba.errors import FbaWarning, FormatError, Remedy
 from fba.formats.text._layout import Layout
 from fba.formats.text._lines import GIVE_RATE, Header, Lines, content, is_header, is_mask, parse_header
-from fba.formats.text._values import Row, ValueParser
+from fba.formats.text._values import FRAME_NUMBER_MAX, Row, ValueParser
 from fba.formats.text.frame_rates import parse_rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, open_source
@@ -273,7 +273,8 @@ class _Reader:
 def _renumber(index: Int64, lines: Int64, path: Path) -> Int64:
     """Return frame numbers that increase: where a number does not, the frame follows the frame before.
 
-    Such files are joined from others, or their program writes 0 for every frame. Warns with FbaWarning.
+    Such files are joined from others, or their program writes 0 for every frame. Warns with FbaWarning. Raises
+    FormatError for numbers that would be too large.
     """
     steps = np.diff(index)
     repeated = steps <= 0
@@ -287,4 +288,12 @@ def _renumber(index: Int64, lines: Int64, path: Path) -> Int64:
         stacklevel=5,
     )
     renumbered: Int64 = np.concatenate([index[:1], index[0] + np.cumsum(np.where(repeated, 1, steps))])
+    if renumbered[-1] > FRAME_NUMBER_MAX:
+        beyond = int(np.argmax(renumbered > FRAME_NUMBER_MAX))
+        raise FormatError(
+            f"the frame would get the number {int(renumbered[beyond])}, at most {FRAME_NUMBER_MAX} is allowed; "
+            "number the frames from 0",
+            path=path,
+            line=int(lines[beyond]),
+        )
     return renumbered
