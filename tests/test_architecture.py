@@ -98,6 +98,7 @@ fba_player.scene
 fba_player.gl
 fba_player.sound
 fba_player.export
+fba_player.web
 fba_player.session
 fba_player._ui.theme
 fba_player._ui.ruler

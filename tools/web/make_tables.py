@@ -1,4 +1,4 @@
-"""Write the tables of the decoder in JavaScript: `python tools/web/make_tables.py`."""
+"""Write the tables of the decoder and of the figure in JavaScript: `python tools/web/make_tables.py`."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from pathlib import Path
 from fba.codec._plane.coder_state import default_limits
 from fba.codec._plane.slots import BAPS, FAPS
 from fba.codec.settings import RANGE_UNIT
+from fba.face.mates import donors
 from fba.parameters import BAP_STANDARD_COUNT, BAP_STEP_TABLES, bap_groups, bap_steps, fap_groups, fap_steps
 
-TARGET = Path(__file__).parents[2] / "player" / "fba_player" / "web" / "decoder" / "tables.js"
+WEB = Path(__file__).parents[2] / "player" / "fba_player" / "web"
+TARGET = WEB / "decoder" / "tables.js"
+FIGURE_TARGET = WEB / "figure" / "tables.js"
 
 
 def make_tables() -> str:
@@ -37,9 +40,20 @@ def make_tables() -> str:
     )
 
 
+def make_figure_tables() -> str:
+    """Return the JavaScript module of the figure."""
+    columns = ",\n  ".join(_list(column) for column in donors())
+    return (
+        "/** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py. */\n"
+        "/** Columns of the FAPs that each unsent FAP copies: its mate, its lip mate, and the mate of that. */\n"
+        f"export const DONORS = [\n  {columns},\n];\n"
+    )
+
+
 def _list(values: Iterable[int]) -> str:
     return json.dumps([int(value) for value in values])
 
 
 if __name__ == "__main__":
     TARGET.write_text(make_tables(), encoding="utf-8")
+    FIGURE_TARGET.write_text(make_figure_tables(), encoding="utf-8")

@@ -1,0 +1,131 @@
+"""Packs a body for the web player: its joints, how BAPs turn them, and how they carry the vertices."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fba.arrays import Int64
+from fba.body.footing import SOLE, has_feet
+from fba.body.head_attachment import skull_of
+from fba.body.skeleton import SIDES, Skeleton
+from fba.body.skin._skinning import Skinner
+from fba.body.solve import _pose_loops as pose_loops
+from fba.body.solve.conventions import convention
+from fba_player._figure.person import Person, head_middle
+from fba_player.web._container import Container, rounded
+from fba_player.web._face_packing import STEP, Chosen, reduce_parts
+
+WEIGHT_STEP = 1 / 16384
+"""Weights and shares of twists are multiples of it."""
+
+
+def pack_body_parts(
+    container: Container, person: Person, face_rows: Int64, detail: float
+) -> tuple[dict[str, Any], Int64]:
+    """Return the header of a person's body, and its vertices that stay, in their new order.
+
+    face_rows: those of the face.
+    """
+    body, head = person.body, person.head
+    chosen: list[Chosen] = []
+    for part in body.parts:
+        shape = person.body_shapes.get(part.name)
+        if shape is not None and len(shape.triangles):
+            fewer = shape.coarser and shape.coarser.triangles_within(detail)
+            chosen.append((part, shape.triangles if fewer is None else fewer, body.starts[part.name], shape))
+    reduced = reduce_parts(container, chosen)
+    skull = skull_of(body)
+    skeleton, default = body.skeleton, Skeleton.default()
+    grounded = has_feet(skeleton) and skeleton is not default
+    if head is None:
+        turn = {"size": 0.0, "centre": body.bind[skull, :3, 3].tolist()}
+        place = {"size": 1.0, "shift": (head_middle(body) - np.array(person.figure.subject.centre)).tolist()}
+    else:
+        turn = {"size": head.size, "centre": head.place[:3, 3].tolist()}
+        place = {"size": head.size, "shift": head.place[:3, 3].tolist()}
+    header = {
+        "parts": reduced.header,
+        "positions": container.add_fractions(body.vertices[reduced.rows], STEP, centred=True),
+        "skeleton": _pack_skeleton(skeleton),
+        "standard": _pack_skeleton(default) if grounded else None,
+        "soles": [_soles(default), _soles(skeleton)] if grounded else [],
+        "bind": [matrix.T.ravel().tolist() for matrix in body.bind],
+        "skull": skull,
+        "turn": turn,
+        "place": place,
+        "skin": _pack_skin(container, body.skinner, reduced.rows),
+        "faceSkin": None if head is None else _pack_skin(container, head.skinner, face_rows),
+    }
+    return header, reduced.rows
+
+
+def _pack_skeleton(skeleton: Skeleton) -> dict[str, Any]:
+    """Return a skeleton and the angles of its joints, outermost first: column of the BAP, axis, sign."""
+    rules = convention("iso")
+    row = {joint: number for number, joint in enumerate(rules.joints)}
+    return {
+        "names": skeleton.names,
+        "parents": skeleton.parents.tolist(),
+        "offsets": rounded(skeleton.offsets.ravel(), 12),
+        "turns": [
+            [
+                [int(rules.bap[row[name], k]), int(rules.axis[row[name], k]), int(rules.sign[row[name], k])]
+                for k in range(len(rules.freedoms(name)))
+            ]
+            for name in skeleton.names
+        ],
+        "translation": rules.translation.tolist(),
+        "metres": (rules.translation_sign * pose_loops.MILLIMETRE).tolist(),
+    }
+
+
+def _soles(skeleton: Skeleton) -> list[list[float]]:
+    """Return the points of both soles: the joint that moves each, and its place relative to that joint."""
+    points = []
+    for side, outwards in zip(SIDES, (1.0, -1.0), strict=True):
+        for joint, x, y, z in SOLE:
+            number = skeleton.number(f"{side}_{joint}")
+            points.append([number, *rounded([outwards * x, y - skeleton.centres[number, 1], z], 12)])
+    return points
+
+
+def _pack_skin(container: Container, skinner: Skinner, rows: Int64) -> dict[str, Any]:
+    """Return how joints carry vertices. rows: (W,), those that stay, in their new order."""
+    number = np.full(len(skinner.vertices), -1)
+    number[rows] = np.arange(len(rows))
+    twists, girdle = skinner.twists, skinner.girdle
+    weights = skinner.weights[rows]
+    turned, shares, bones = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2))], []
+    for bone in range(len(twists.joint)):
+        own = slice(int(twists.starts[bone]), int(twists.starts[bone + 1]))
+        kept = number[twists.rows[own]]
+        order = np.argsort(kept)[np.count_nonzero(kept < 0) :]
+        turned.append(kept[order])
+        shares.append(twists.shares[own][order])
+        bones.append(
+            {
+                "joint": int(twists.joint[bone]),
+                "child": int(twists.child[bone]),
+                "count": len(order),
+                "centre": twists.centre[bone].tolist(),
+                "axis": twists.axis[bone].tolist(),
+                "childAxis": twists.child_axis[bone].tolist(),
+            }
+        )
+    armpits = number[girdle.rows]
+    order = np.argsort(armpits)[np.count_nonzero(armpits < 0) :]
+    return {
+        "joints": container.add_integers(np.where(weights > 0, skinner.joints[rows], 0)),
+        "weights": container.add_fractions(weights[:, 1:], WEIGHT_STEP),
+        "bones": bones,
+        "turned": container.add_integers(np.concatenate(turned)),
+        "shares": container.add_fractions(np.concatenate(shares), WEIGHT_STEP),
+        "girdles": [
+            {"joints": joints.tolist(), "centre": centre.tolist(), "arm": arm.tolist()}
+            for joints, centre, arm in zip(girdle.joints, girdle.centre, girdle.arm, strict=True)
+        ],
+        "armpits": container.add_integers(armpits[order]),
+        "straight": container.add_fractions(girdle.shares[order][:, None], WEIGHT_STEP),
+    }

@@ -1,0 +1,210 @@
+/** Moves the vertices of a face by FAPs: what `fba.face.Deformer` does, with the motion of each FAP as few shapes. */
+import { checkedFap, checkedList, checkedNumber, checkedNumbers, refuse } from "./container.js";
+import { IDENTITY, multiply, rotate, setColumns, turnVector } from "./matrices.js";
+import { Shading, readParts } from "./parts.js";
+import { Rules } from "./resolve.js";
+
+/** @typedef {import("./container.js").Container} Container */
+
+/**
+ * What a FAP does to some vertices of a part: shapes, the first at `shape`, times curves over its value; curve c has at border b
+ * the value curves[c * borders.length + b], and is linear between them and beyond.
+ * @typedef {{column: number, part: number, borders: Float64Array, curves: Float64Array, count: number, row: number, rows: number, shape: number}} Track
+ *
+ * @typedef {{column: number, kind: string, amount: Float64Array, centre: Float64Array}} Transform
+ */
+
+const FAPS = 68;
+const KINDS = ["translation", "rotation", "scale"];
+
+/** A face that FAPs move. Axes: +x the subject's left, +y up, +z forward; metres. */
+export class Face {
+  /** @param {Container} container @param {Record<string, any>} header */
+  constructor(container, header) {
+    this._rest = container.fractions(header.positions, "positions of the face", undefined, 3);
+    const count = this._rest.length / 3;
+    /** Positions moved by FAPs, three numbers a vertex, without the turns of parts and head. */
+    this.positions = this._rest.slice();
+    /** Their normals. */
+    this.normals = new Float32Array(3 * count);
+    this.parts = readParts(container, header.parts, this.positions, this.normals);
+    /** How the face fills in what is not sent; see `Resolver`. */
+    this.rules = new Rules(header);
+    /** 1 for an adult's size. */
+    this.scale = checkedNumber(header.scale, "the scale of the face");
+    /** Positions of feature points by name. @type {Map<string, Float64Array>} */
+    this.points = new Map(Object.entries(header.points ?? {}).map(([name, place]) => [name, checkedNumbers(place, "a feature point", 3)]));
+    /** Where the head turns about. */
+    this.centre = checkedNumbers(header.centre, "the centre of the head", 3);
+    this._sway = container.fractions(header.sway, "the sway of the neck", count, 1);
+    this._rows = container.indices(header.rows, "the rows of the motion", count, undefined, 1);
+    this._shapes = container.integers(header.shapes?.array, "the shapes of the motion");
+    this._step = checkedNumber(header.shapes.step, "the step of the motion");
+    if (this._shapes.columns !== 3) refuse("has shapes that are not of three numbers");
+    this._tracks = readTracks(header, this._rows, this._shapes.rows, this.parts);
+    this._transforms = readTransforms(header, this.parts);
+    const moving = new Uint8Array(count);
+    for (const { row, rows } of this._tracks) for (let at = row; at < row + rows; at += 1) moving[this._rows[at]] = 1;
+    this._shadings = this.parts.map(({ first, count: size, positions, triangles, normals }) => {
+      const shading = new Shading(triangles, positions, moving.subarray(first, first + size));
+      normals.set(shading.rest);
+      return shading;
+    });
+    this._faps = new Float64Array(FAPS);
+    this._touched = new Uint8Array(this.parts.length);
+    this._was = new Uint8Array(this.parts.length);
+    /** Turn of each part within the head, 16 numbers each, column by column. */
+    this.partMatrices = this.parts.map(() => Float64Array.from(IDENTITY));
+    /** Turn of the head, 16 numbers, column by column. */
+    this.headMatrix = Float64Array.from(IDENTITY);
+    this._turn = Float64Array.from(IDENTITY);
+    this._before = Float64Array.from(IDENTITY);
+    this._bent = Float64Array.from(IDENTITY);
+    this._combined = Float64Array.from(IDENTITY);
+  }
+
+  /**
+   * Move the face: positions, normals, partMatrices and headMatrix, and `changed` of its parts. faps: 68 numbers, as a
+   * `Resolver` gives them.
+   * @param {ArrayLike<number>} faps
+   */
+  pose(faps) {
+    this._faps.set(faps);
+    this.positions.set(this._rest);
+    this._touched.fill(0);
+    for (const track of this._tracks) this._move(track);
+    this.parts.forEach((part, at) => {
+      part.changed = this._touched[at] + this._was[at] > 0;
+      this._before.set(this.partMatrices[at]);
+      if (this._touched[at]) this._shadings[at].update(part.positions, part.normals);
+      else if (this._was[at]) part.normals.set(this._shadings[at].rest);
+      this._compose(this._transforms[at], this.partMatrices[at]);
+      if (this._before.some((entry, place) => entry !== this.partMatrices[at][place])) part.changed = true;
+    });
+    this._was.set(this._touched);
+    this._compose(this._transforms[this.parts.length], this.headMatrix);
+  }
+
+  /** @param {Track} track */
+  _move({ column, part, borders, curves, count, row, rows, shape }) {
+    const value = this._faps[column];
+    if (value === 0) return;
+    this._touched[part] = 1;
+    const { positions, _rows: moved } = this;
+    const { values } = this._shapes;
+    const size = borders.length;
+    let border = 1;
+    while (border < size - 1 && value > borders[border]) border += 1;
+    const share = (value - borders[border - 1]) / (borders[border] - borders[border - 1]);
+    for (let curve = 0, from = 3 * shape; curve < count; curve += 1) {
+      const low = curves[curve * size + border - 1];
+      const weight = (low + (curves[curve * size + border] - low) * share) * this._step;
+      for (let at = row; at < row + rows; at += 1, from += 3) {
+        const to = 3 * moved[at];
+        positions[to] += weight * values[from];
+        positions[to + 1] += weight * values[from + 1];
+        positions[to + 2] += weight * values[from + 2];
+      }
+    }
+  }
+
+  /** Write the product of transforms, the outermost first. @param {Transform[]} transforms @param {Float64Array} result */
+  _compose(transforms, result) {
+    result.set(IDENTITY);
+    for (const { column, kind, amount, centre } of transforms) {
+      const value = this._faps[column];
+      if (value === 0) continue;
+      const [x, y, z] = [value * amount[0], value * amount[1], value * amount[2]];
+      const { _turn: turn } = this;
+      turn.set(IDENTITY);
+      if (kind === "translation") setColumns(turn, 12, x, y, z);
+      else if (kind === "rotation") rotate(turn, x, y, z, centre);
+      else {
+        [turn[0], turn[5], turn[10]] = [1 + x, 1 + y, 1 + z];
+        setColumns(turn, 12, -x * centre[0], -y * centre[1], -z * centre[2]);
+      }
+      multiply(result, turn, result);
+    }
+  }
+
+  /**
+   * Write positions and normals, parts and head turned, in the frame of the model. bend: whether the neck bends, as players
+   * show it; else all of the model turns with the head. withHead: false for the frame of the head.
+   * @param {Float32Array} positions @param {Float32Array} normals @param {{bend?: boolean, withHead?: boolean}} [options]
+   */
+  place(positions, normals, { bend = true, withHead = true } = {}) {
+    const [x, y, z] = turnVector(this.headMatrix);
+    for (let number = 0; number < this.parts.length; number += 1) {
+      const { first, count } = this.parts[number];
+      const stop = first + count;
+      for (let start = first, next = first; start < stop; start = next) {
+        const share = withHead && bend ? this._sway[start] : 1;
+        while (next < stop && (this._sway[next] === share || !withHead || !bend)) next += 1;
+        if (share < 1) rotate(this._bent, x * share, y * share, z * share, this.centre);
+        multiply(!withHead ? IDENTITY : share < 1 ? this._bent : this.headMatrix, this.partMatrices[number], this._combined);
+        put(this._combined, this.positions, positions, 3 * start, 3 * next, 1);
+        put(this._combined, this.normals, normals, 3 * start, 3 * next, 0);
+      }
+    }
+  }
+}
+
+/**
+ * Return what each FAP does to each part.
+ * @param {Record<string, any>} header @param {ArrayLike<number>} moved vertices of all tracks @param {number} shapes how many rows there are @param {import("./parts.js").Part[]} parts
+ */
+function readTracks(header, moved, shapes, parts) {
+  let [row, shape] = [0, 0];
+  return checkedList(header.tracks, "tracks").map((entry) => {
+    const borders = checkedNumbers(entry.borders, "borders");
+    const curves = checkedList(entry.curves, "curves").map((curve) => checkedNumbers(curve, "a curve", borders.length));
+    if (borders.length < 2 || borders.some((border, at) => at && border <= borders[at - 1])) refuse("has borders that do not rise");
+    const rows = checkedNumber(entry.rows, "rows of a FAP", moved.length - row + 1);
+    /** @type {Track} */
+    const track = {
+      column: checkedFap(entry.fap),
+      part: rows ? parts.findIndex(({ first, count }) => moved[row] >= first && moved[row] < first + count) : 0,
+      borders,
+      curves: Float64Array.from(curves.flatMap((curve) => [...curve])),
+      count: curves.length,
+      row,
+      rows,
+      shape,
+    };
+    row += rows;
+    shape += rows * curves.length;
+    if (shape > shapes) refuse("ends inside the shapes of the motion");
+    return track;
+  });
+}
+
+/** Return what turns each part, outermost first, then the head. @param {Record<string, any>} header @param {import("./parts.js").Part[]} parts @returns {Transform[][]} */
+function readTransforms(header, parts) {
+  /** @type {Transform[][]} */
+  const transforms = Array.from({ length: parts.length + 1 }, () => []);
+  for (const entry of checkedList(header.transforms, "turns")) {
+    const part = entry.part === null ? parts.length : parts.findIndex(({ name }) => name === entry.part);
+    if (!KINDS.includes(entry.kind)) refuse(`has an unknown turn ${JSON.stringify(entry.kind)}`);
+    if (part < 0) continue; // of a part that is not shown
+    const column = checkedFap(entry.fap);
+    const numbers = { amount: checkedNumbers(entry.amount, "a turn", 3), centre: checkedNumbers(entry.centre, "a turn's centre", 3) };
+    transforms[part].push({ column, kind: entry.kind, ...numbers });
+  }
+  return transforms;
+}
+
+/**
+ * Write moved vectors.
+ * @param {Float64Array} matrix @param {Float32Array} from @param {Float32Array} to @param {number} start @param {number} stop @param {number} shift 1 for points, 0 for directions
+ */
+function put(matrix, from, to, start, stop, shift) {
+  const [a, b, c, , d, e, f, , g, h, i, , j, k, l] = matrix;
+  for (let at = start; at < stop; at += 3) {
+    const x = from[at];
+    const y = from[at + 1];
+    const z = from[at + 2];
+    to[at] = a * x + d * y + g * z + shift * j;
+    to[at + 1] = b * x + e * y + h * z + shift * k;
+    to[at + 2] = c * x + f * y + i * z + shift * l;
+  }
+}

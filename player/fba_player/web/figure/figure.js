@@ -1,0 +1,125 @@
+/** What is shown: a head, or a person whose head it is; moved by FAPs and BAPs. */
+import { Body } from "./body.js";
+import { Container, checkedNumber, checkedNumbers, refuse } from "./container.js";
+import { Face } from "./face.js";
+import { IDENTITY, multiply } from "./matrices.js";
+import { Skin } from "./skin.js";
+
+/** @typedef {import("./parts.js").Part} Part */
+
+/**
+ * An eyeball, which is a part of the face, too. centre, radius: in the frame of matrix, which leads into the world. iris,
+ * pupil: their diameters. All in metres.
+ * @typedef {{part: Part, matrix: Float64Array, centre: Float64Array, radius: number, iris: number, pupil: number}} Eye
+ */
+
+const VERSION = 1;
+const FAPS = 68;
+const BAPS = 296;
+const PUPILS = [28, 29]; // columns of FAPs 29 and 30
+
+/**
+ * A head or a person made by `fba_player.web.pack_face` or `pack_body`. Positions are in the world: metres, +x the
+ * subject's left, +y up, +z forward; a person stands on y = 0, a head is where its model has it.
+ */
+export class Figure {
+  /** @param {Uint8Array} bytes */
+  constructor(bytes) {
+    const container = new Container(bytes);
+    const { header } = container;
+    if (header.version !== VERSION) refuse(`is of version ${header.version}, expected ${VERSION}`);
+    this.face = new Face(container, header.face ?? refuse("has no face"));
+    this.body = header.body ? new Body(container, header.body) : null;
+    this._positions = this.face.positions.slice();
+    this._normals = this.face.normals.slice();
+    if (this.body && this.face.positions.length) {
+      const { parents, inverse } = this.body;
+      this._skin = new Skin(container, header.body.faceSkin, this._positions.length / 3, parents.length, parents, inverse);
+      this._placed = this._positions.slice();
+      this._local = this._normals.slice();
+    }
+    /** The face's parts as they are shown: their positions are in the world. */
+    const shown = this.face.parts.map((part) => {
+      const range = /** @type {[number, number]} */ ([3 * part.first, 3 * (part.first + part.count)]);
+      return { ...part, positions: this._positions.subarray(...range), normals: this._normals.subarray(...range), changed: true };
+    });
+    /** All parts, to be drawn. @type {Part[]} */
+    this.parts = [...(this.body?.parts ?? []), ...shown];
+    this._shown = shown;
+    /** @type {(Eye & {side: number, widest: number, step: number, number: number})[]} */
+    this._eyes = (header.face.eyes ?? []).map((/** @type {Record<string, any>} */ eye) => {
+      const number = checkedNumber(eye.part, "the part of an eye", shown.length);
+      const [side, radius, iris, widest, step] = checkedNumbers(eye.numbers, "an eye", 5);
+      const matrix = Float64Array.from(IDENTITY);
+      return { part: shown[number], number, matrix, centre: checkedNumbers(eye.centre, "the centre of an eye", 3), side, radius, iris, pupil: widest, widest, step };
+    });
+    /** From the frame of the face's model into the world, the head turned. */
+    this.faceMatrix = this.body?.faceMatrix ?? this.face.headMatrix;
+    const { centre, halfHeight, halfWidth } = header.face.subject;
+    /** What a camera should have in view of the head, in the frame of its model: its middle, and half its size. */
+    this.subject = { centre: checkedNumbers(centre, "the middle of the head", 3), halfHeight: checkedNumber(halfHeight, "the height"), halfWidth: checkedNumber(halfWidth, "the width") };
+    this._faps = new Float64Array(FAPS).fill(NaN);
+    this._baps = new Float64Array(this.body ? BAPS : 0).fill(NaN);
+    this._before = new Float64Array(16);
+    this._stood = new Float64Array(16);
+    this._nothing = new Float64Array(BAPS);
+    this.show(new Float64Array(FAPS));
+  }
+
+  /** Eyeballs; their parts are among `parts`. @returns {Eye[]} */
+  get eyes() {
+    return this._eyes;
+  }
+
+  /** How the face fills in what is not sent, for a `Resolver` or a `Timeline`. */
+  get rules() {
+    return this.face.rules;
+  }
+
+  /**
+   * Move the figure: positions and normals of `parts`, whose `changed` says which moved since the last call. Return whether
+   * any did.
+   * @param {ArrayLike<number>} faps 68, as a `Resolver` gives them @param {ArrayLike<number>} [baps] 296, for a body
+   */
+  show(faps, baps = this._nothing) {
+    const sameFace = same(this._faps, faps);
+    const sameBody = same(this._baps, baps);
+    for (const part of this.parts) part.changed = false;
+    if (sameFace && sameBody) return false;
+    this._faps.set(faps);
+    this._baps.set(this.body ? baps : []);
+    this._before.set(this.faceMatrix);
+    if (!sameFace) this.face.pose(faps);
+    if (this.body) this._showPerson(this.body, sameFace);
+    else this._showHead();
+    for (const eye of this._eyes) {
+      multiply(this.faceMatrix, this.face.partMatrices[eye.number], eye.matrix);
+      eye.pupil = eye.widest + eye.step * this._faps[PUPILS[eye.side]];
+    }
+    return this.parts.some(({ changed }) => changed);
+  }
+
+  /** @param {Body} body @param {boolean} sameFace */
+  _showPerson(body, sameFace) {
+    body.pose(this._baps, this.face.headMatrix);
+    for (const part of this.parts) part.changed = true;
+    if (!this._skin || !this._placed || !this._local) return;
+    if (!sameFace) {
+      this.face.place(this._positions, this._local, { withHead: false });
+      body.placeFace(this._positions, this._placed);
+    }
+    this._skin.apply(body.joints, this._placed, this._local, this._positions, this._normals);
+  }
+
+  _showHead() {
+    const turned = this.faceMatrix.some((entry, at) => entry !== this._before[at]);
+    this.face.place(this._positions, this._normals);
+    this._shown.forEach((part, at) => (part.changed = turned || this.face.parts[at].changed));
+  }
+}
+
+/** @param {Float64Array} before @param {ArrayLike<number>} now */
+function same(before, now) {
+  for (let at = 0; at < before.length; at += 1) if (before[at] !== now[at]) return false;
+  return true;
+}

@@ -1,0 +1,178 @@
+/** The meshes of a figure: what they look like, and their normals as they move. */
+import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.js";
+
+/** @typedef {import("./container.js").Container} Container */
+
+/**
+ * A mesh of a figure, whose vertices are count from `first` on. positions, normals: three numbers each, in metres, which
+ * move. changed: whether the last pose moved them. triangles: three vertices each, counted from 0, counter-clockwise from
+ * outside. colour: linear light. gloss: 1 - roughness. colours: linear light, three numbers each, glosses: one each, or
+ * null where all vertices have `colour` and `gloss`. texture: bytes of a picture in sRGB that multiplies the colours, or
+ * null. texcoords: two numbers each, from the picture's top left. alpha: what texture's alpha and opacity mean, as in
+ * `fba.mesh.Material`. hair: whether it consists of single hairs.
+ * @typedef {{
+ *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array, changed: boolean,
+ *   triangles: Uint32Array, colour: Float64Array, gloss: number, colours: Float32Array | null, glosses: Float32Array | null,
+ *   texture: Uint8Array | null, texcoords: Float32Array | null, opacity: number, alpha: string, cutoff: number,
+ *   twoSided: boolean, hair: boolean
+ * }} Part
+ */
+
+const ALPHAS = ["auto", "opaque", "mask", "blend"];
+const SAME_SURFACE = 0.7; // cosine between the normals of vertices at one place that share a normal
+
+/**
+ * Return the parts that a header lists; positions and normals of all of them are handed in.
+ * @param {Container} container @param {unknown} listed @param {Float32Array} positions @param {Float32Array} normals @returns {Part[]}
+ */
+export function readParts(container, listed, positions, normals) {
+  let first = 0;
+  const parts = checkedList(listed, "parts").map((/** @type {Record<string, any>} */ entry) => {
+    const what = `part ${JSON.stringify(entry?.name)}`;
+    const count = checkedNumber(entry.count, `the vertices of ${what}`, positions.length / 3 - first + 1);
+    const part = { ...surface(container, entry, count, what), ...mesh(container, entry, count, what) };
+    const [start, stop] = [3 * first, 3 * (first + count)];
+    const moving = { first, positions: positions.subarray(start, stop), normals: normals.subarray(start, stop), changed: true };
+    first += count;
+    return { ...part, ...moving };
+  });
+  if (3 * first !== positions.length) refuse(`has ${positions.length / 3} vertices, expected the ${first} of its parts`);
+  return parts;
+}
+
+/** @param {Container} container @param {Record<string, any>} entry @param {number} count @param {string} what */
+function mesh(container, entry, count, what) {
+  const corners = container.indices(entry.triangles, `the triangles of ${what}`, count, undefined, 1);
+  if (corners.length % 3) refuse(`has ${corners.length} corners in ${what}, expected three a triangle`);
+  return { name: String(entry.name), kind: String(entry.kind), count, triangles: Uint32Array.from(corners) };
+}
+
+/** @param {Container} container @param {Record<string, any>} entry @param {number} count @param {string} what */
+function surface(container, entry, count, what) {
+  const coded = entry.colours === undefined ? null : container.fractions(entry.colours, `the colours of ${what}`, count, 4);
+  const texture = entry.texture === undefined ? null : container.file(entry.texture, `the texture of ${what}`);
+  return {
+    colour: checkedNumbers(entry.colour, `the colour of ${what}`, 3),
+    gloss: checkedNumber(entry.gloss, `the gloss of ${what}`),
+    colours: coded && Float32Array.from({ length: 3 * count }, (_, at) => coded[4 * Math.floor(at / 3) + (at % 3)] ** 2),
+    glosses: coded && Float32Array.from({ length: count }, (_, at) => coded[4 * at + 3]),
+    texture,
+    texcoords: texture && container.fractions(entry.texcoords, `the texture coordinates of ${what}`, count, 2),
+    opacity: checkedNumber(entry.opacity, `the opacity of ${what}`),
+    alpha: ALPHAS.includes(entry.alpha) ? String(entry.alpha) : refuse(`has an unknown alpha in ${what}`),
+    cutoff: checkedNumber(entry.cutoff, `the cutoff of ${what}`),
+    twoSided: entry.twoSided === true,
+    hair: entry.hair === true,
+  };
+}
+
+/** Computes the normals of a part from its triangles, smooth across vertices at one place. */
+export class Shading {
+  /** @param {Uint32Array} triangles @param {Float32Array} rest neutral positions of the part @param {Uint8Array} moving which vertices may move by themselves */
+  constructor(triangles, rest, moving) {
+    const count = rest.length / 3;
+    const alone = Uint32Array.from({ length: count }, (_, at) => at);
+    const own = new Float32Array(3 * count);
+    sum(triangles, triangles, rest, own);
+    normalise(own, own);
+    this._group = groups(rest, own, alone);
+    const corners = triangles.map((corner) => this._group[corner]);
+    const sums = new Float32Array(3 * count);
+    sum(triangles, corners, rest, sums);
+    normalise(sums, sums);
+    /** Neutral normals. */
+    this.rest = Float32Array.from(own, (_, at) => sums[3 * this._group[Math.floor(at / 3)] + (at % 3)]);
+    const changing = new Uint8Array(count);
+    for (let at = 0; at < triangles.length; at += 3) {
+      if (moving[triangles[at]] || moving[triangles[at + 1]] || moving[triangles[at + 2]]) {
+        for (let corner = at; corner < at + 3; corner += 1) changing[corners[corner]] = 1;
+      }
+    }
+    const used = (/** @type {number} */ at) => changing[corners[at]] || changing[corners[at + 1]] || changing[corners[at + 2]];
+    const chosen = Uint32Array.from(Array.from({ length: triangles.length / 3 }, (_, at) => 3 * at).filter(used));
+    this._triangles = expandTriangles(triangles, chosen);
+    this._corners = expandTriangles(corners, chosen);
+    this._vertices = alone.filter((at) => changing[this._group[at]]);
+    this._sums = sums;
+  }
+
+  /** Write the normals of vertices that triangles of moving ones touch. @param {Float32Array} positions @param {Float32Array} normals */
+  update(positions, normals) {
+    const { _sums: sums, _group: group, _vertices: vertices, rest } = this;
+    for (let at = 0; at < vertices.length; at += 1) {
+      const to = 3 * group[vertices[at]];
+      sums[to] = sums[to + 1] = sums[to + 2] = 0;
+    }
+    sum(this._triangles, this._corners, positions, sums);
+    for (let at = 0; at < vertices.length; at += 1) {
+      const from = 3 * group[vertices[at]];
+      const to = 3 * vertices[at];
+      const x = sums[from];
+      const y = sums[from + 1];
+      const z = sums[from + 2];
+      const length = Math.sqrt(x * x + y * y + z * z);
+      const still = !(length > 1e-15);
+      normals[to] = still ? rest[to] : x / length;
+      normals[to + 1] = still ? rest[to + 1] : y / length;
+      normals[to + 2] = still ? rest[to + 2] : z / length;
+    }
+  }
+}
+
+/** @param {Uint32Array} corners @param {Uint32Array} chosen first corners of triangles */
+function expandTriangles(corners, chosen) {
+  return Uint32Array.from({ length: 3 * chosen.length }, (_, at) => corners[chosen[Math.floor(at / 3)] + (at % 3)]);
+}
+
+/** Add the normal of each triangle, twice its area long, to its corners in sums. @param {Uint32Array} triangles @param {Uint32Array} corners @param {Float32Array} positions @param {Float32Array} sums */
+function sum(triangles, corners, positions, sums) {
+  for (let at = 0; at < triangles.length; at += 3) {
+    const a = 3 * triangles[at];
+    const b = 3 * triangles[at + 1];
+    const c = 3 * triangles[at + 2];
+    const x = positions[a];
+    const y = positions[a + 1];
+    const z = positions[a + 2];
+    const ux = positions[b] - x;
+    const uy = positions[b + 1] - y;
+    const uz = positions[b + 2] - z;
+    const vx = positions[c] - x;
+    const vy = positions[c + 1] - y;
+    const vz = positions[c + 2] - z;
+    const nx = uy * vz - uz * vy;
+    const ny = uz * vx - ux * vz;
+    const nz = ux * vy - uy * vx;
+    for (let corner = at; corner < at + 3; corner += 1) {
+      const to = 3 * corners[corner];
+      sums[to] += nx;
+      sums[to + 1] += ny;
+      sums[to + 2] += nz;
+    }
+  }
+}
+
+/** Scale vectors to length 1; those without a direction point forward. @param {Float32Array} vectors @param {Float32Array} out */
+function normalise(vectors, out) {
+  for (let at = 0; at < vectors.length; at += 3) {
+    const length = Math.hypot(vectors[at], vectors[at + 1], vectors[at + 2]);
+    for (let axis = 0; axis < 3; axis += 1) out[at + axis] = length > 1e-15 ? vectors[at + axis] / length : Number(axis === 2);
+  }
+}
+
+/** Return the first of the vertices at each vertex's place whose surface is the same. @param {Float32Array} positions @param {Float32Array} normals @param {Uint32Array} alone */
+function groups(positions, normals, alone) {
+  /** @type {Map<string, number[]>} */
+  const leaders = new Map();
+  return alone.map((vertex) => {
+    const at = 3 * vertex;
+    const key = `${positions[at]} ${positions[at + 1]} ${positions[at + 2]}`;
+    const here = leaders.get(key) ?? [];
+    leaders.set(key, here);
+    const same = here.find((other) => {
+      const from = 3 * other;
+      return normals[at] * normals[from] + normals[at + 1] * normals[from + 1] + normals[at + 2] * normals[from + 2] > SAME_SURFACE;
+    });
+    if (same === undefined) here.push(vertex);
+    return same ?? vertex;
+  });
+}

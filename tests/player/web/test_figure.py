@@ -1,0 +1,193 @@
+"""Heads and persons in JavaScript: what they show is what those in Python show."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fba
+from fba.arrays import Float64
+from fba.body import BodyModel
+from fba.body.footing import GroundedPoser
+from fba.face import FaceModel
+from fba_player._figure.face import FaceFigure, build_figure
+from fba_player._figure.person import Person, build_person
+from fba_player.playback.timeline import Timeline
+from fba_player.view._geometry import rotation_vector
+from fba_player.web._packing import DETAIL, Packed, pack_figure
+from tools.web import make_tables
+
+needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
+pytestmark = pytest.mark.filterwarnings("ignore::fba.FbaWarning")
+SAMPLES = Path(fba.__file__).parent / "samples"
+VECTORS = Path(__file__).parents[4] / "shared" / "vectors" / "generated"
+STREAMS = 20
+FRAMES = 3
+FAP_ERROR, VERTEX_ERROR, JOINT_ERROR = 1.0, 1e-4, np.radians(0.01)
+
+
+def test_its_tables_are_those_of_the_standard() -> None:
+    assert make_tables.FIGURE_TARGET.read_text(encoding="utf-8") == make_tables.make_figure_tables()
+
+
+@dataclass
+class Errors:
+    """The largest differences: of FAPs, of vertices (m), of joints (radians and m); of normals (radians) that of
+    95 of 100 in a frame."""
+
+    faps: float = 0.0
+    vertices: float = 0.0
+    turn: float = 0.0
+    joints: float = 0.0
+    normals: float = 0.0
+
+    def add(self, name: str, values: Any) -> None:
+        if name == "normals":
+            values = np.quantile(values, 0.95)
+        setattr(self, name, max(getattr(self, name), float(np.max(values, initial=0.0))))
+
+
+@cache
+def _head() -> tuple[FaceFigure, Packed]:
+    figure = build_figure(FaceModel.default())
+    return figure, pack_figure(figure, None, DETAIL)
+
+
+@cache
+def _person() -> tuple[Person, Packed]:
+    person = build_person(BodyModel.default(), _head()[0])
+    return person, pack_figure(person.figure, person, DETAIL)
+
+
+def _samples() -> list[bytes]:
+    return [
+        fba.encode(fba.read(file)) for file in sorted(SAMPLES.iterdir()) if file.suffix in (".fap", ".bvh")
+    ]
+
+
+@needs_node
+@pytest.mark.parametrize("kind", ["head", "person"])
+def test_samples(kind: str, tmp_path: Path) -> None:
+    _check(compare(kind, _samples(), tmp_path))
+
+
+@needs_node
+@pytest.mark.skipif(not VECTORS.is_dir(), reason="no shared vectors here")
+def test_vectors(tmp_path: Path) -> None:
+    streams = [file.read_bytes() for file in sorted(VECTORS.glob("*.fba"))]
+    chosen = streams[:: max(len(streams) // STREAMS, 1)][:STREAMS]
+    _check(compare("person", chosen, tmp_path))
+
+
+def _check(errors: Errors) -> None:
+    assert errors.faps <= FAP_ERROR
+    assert errors.vertices <= VERTEX_ERROR
+    assert errors.turn <= JOINT_ERROR
+    assert errors.joints <= VERTEX_ERROR
+
+
+def compare(kind: str, streams: Sequence[bytes], folder: Path, frames: int = FRAMES) -> Errors:
+    """Return how far a head or a person in JavaScript is from the one in Python in frames of streams."""
+    shown, packed = _head() if kind == "head" else _person()
+    (folder / "figure").write_bytes(packed.data)
+    request: dict[str, Any] = {"figure": str(folder / "figure"), "streams": []}
+    animations = [fba.decode(stream) for stream in streams]
+    for number, (stream, animation) in enumerate(zip(streams, animations, strict=True)):
+        (folder / f"stream{number}").write_bytes(stream)
+        chosen = np.unique(np.linspace(0, len(animation) - 1, frames).astype(int)).tolist()
+        request["streams"].append(
+            {"stream": str(folder / f"stream{number}"), "frames": chosen, "result": str(folder / f"{number}")}
+        )
+    (folder / "request").write_text(json.dumps(request))
+    program = str(Path(__file__).with_name("show_streams.mjs"))
+    done = subprocess.run(
+        ["node", program, str(folder / "request")], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    errors = Errors()
+    for entry, animation in zip(request["streams"], animations, strict=True):
+        values = np.fromfile(entry["result"]).reshape(len(entry["frames"]), -1)
+        timeline = Timeline(animation, FaceModel.default())
+        for frame, row in zip(entry["frames"], values, strict=True):
+            time = float(timeline.time_of(frame))
+            faps, baps = timeline.faps(time), timeline.baps(time)
+            errors.add("faps", np.abs(row[:68] - faps))
+            if isinstance(shown, Person):
+                _compare_person(shown, packed, faps, baps, row[68:], errors)
+            else:
+                _compare_head(shown, packed, faps, row[68:], errors)
+    return errors
+
+
+def _compare_head(figure: FaceFigure, packed: Packed, faps: Any, row: Float64, errors: Errors) -> None:
+    rigid, placed, normals = row.reshape(3, -1, 3)
+    expected = np.empty_like(figure.model.vertices)
+    figure.deformer(faps, normals=expected)
+    errors.add("vertices", _distances(rigid, figure.deformer(faps)[packed.face_rows]))
+    pose = figure.pose(faps)
+    axis = rotation_vector(pose.turn[:3, :3])
+    for name, shape in figure.shapes.items():
+        inside, rows = _inside(packed.face_rows, figure.rows(name))
+        sways = shape.sway[rows - figure.rows(name).start]
+        bent = _turned(pose.positions[rows] - figure.centre, axis, sways) + figure.centre
+        errors.add("vertices", _distances(placed[inside], bent))
+        errors.add("normals", _angles(normals[inside], _turned(pose.normals[rows], axis, sways)))
+
+
+def _compare_person(
+    person: Person, packed: Packed, faps: Any, baps: Float64, row: Float64, errors: Errors
+) -> None:
+    count = 16 * len(person.body.skeleton)
+    found = row[:count].reshape(-1, 4, 4).transpose(0, 2, 1)
+    joints = person.joints(faps, GroundedPoser(person.body.skeleton).pose(baps))
+    between = np.einsum("jki,jkl->jil", found[:, :3, :3], joints[:, :3, :3])
+    apart = np.stack(
+        [between[:, (k + 1) % 3, (k + 2) % 3] - between[:, (k + 2) % 3, (k + 1) % 3] for k in range(3)]
+    )
+    errors.add("turn", np.arctan2(np.linalg.norm(apart, axis=0), np.trace(between, axis1=1, axis2=2) - 1))
+    errors.add("joints", _distances(found[:, :3, 3], joints[:, :3, 3]))
+    positions, normals = row[count:].reshape(2, -1, 3)
+    assert person.head is not None
+    pose = person.figure.pose(faps)
+    body, face = np.empty_like(person.body.vertices), np.empty_like(pose.normals)
+    body_normals, face_normals = np.empty_like(body), np.empty_like(face)
+    person.body.skin(joints, body, body_normals)
+    person.head.skin(pose.positions, joints, face, local_normals=pose.normals, normals=face_normals)
+    expected = np.concatenate([body[packed.body_rows], face[packed.face_rows]])
+    errors.add("vertices", _distances(positions, expected))
+    expected = np.concatenate([body_normals[packed.body_rows], face_normals[packed.face_rows]])
+    errors.add("normals", _angles(normals, expected))
+
+
+def _inside(rows: Any, part: slice) -> tuple[Any, Any]:
+    inside = (rows >= part.start) & (rows < part.stop)
+    return inside, rows[inside]
+
+
+def _distances(one: Any, other: Any) -> Float64:
+    return np.asarray(np.linalg.norm(one - other, axis=1))
+
+
+def _angles(one: Any, other: Any) -> Float64:
+    cosines = (one * other).sum(axis=1) / np.linalg.norm(one, axis=1) / np.linalg.norm(other, axis=1)
+    return np.asarray(np.arccos(np.clip(cosines, -1, 1)))
+
+
+def _turned(vectors: Any, axis: Float64, shares: Any) -> Float64:
+    """Return vectors (N, 3) turned about an axis by shares (N,) of its length."""
+    angle = float(np.linalg.norm(axis))
+    if angle == 0:
+        return np.asarray(vectors, dtype=np.float64)
+    unit, vectors = axis / angle, np.asarray(vectors, dtype=np.float64)
+    sine, cosine = np.sin(angle * shares)[:, None], np.cos(angle * shares)[:, None]
+    along = (vectors @ unit)[:, None] * unit
+    return vectors * cosine + np.cross(unit, vectors) * sine + along * (1 - cosine)
