@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from fba.codec._plane.coder_state import default_limits
 from fba.codec._plane.slots import BAPS, FAPS
@@ -20,21 +21,30 @@ FIGURE_TARGET = WEB / "figure" / "tables.js"
 def make_tables() -> str:
     """Return the JavaScript module."""
     limits = default_limits() // RANGE_UNIT
-    baps = [limits[which, BAPS][:BAP_STANDARD_COUNT] for which in range(4)]
-    steps = ", ".join(f"{name}: {_list(bap_steps(name))}" for name in BAP_STEP_TABLES)
+    i_max, i_min, p_max, p_min = (limits[which, BAPS][:BAP_STANDARD_COUNT] for which in range(4))
+    assert np.array_equal(p_max, p_min)
+    assert all((bap_steps(name)[BAP_STANDARD_COUNT:] == 1).all() for name in BAP_STEP_TABLES)
+    standard = {name: bap_steps(name)[:BAP_STANDARD_COUNT] for name in BAP_STEP_TABLES}
+    faps = fap_steps()[2:]
+    steps = sorted({int(step) for table in (faps, *standard.values()) for step in table})
+    bap_tables = ",\n".join(
+        f"  {name}: {_digits(map(steps.index, table.tolist()))}" for name, table in standard.items()
+    )
     return "\n".join(
         [
-            "/** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py. Limits are in units of 60. */",
-            f"export const FAP_GROUPS = {json.dumps(fap_groups())};",
-            f"export const BAP_GROUPS = {json.dumps(bap_groups())};",
-            "/** Quantiser steps of FAPs 3 to 68. */",
-            f"export const FAP_STEPS = {_list(fap_steps()[2:])};",
-            "/** Quantiser steps of BAPs 1 to 296. */",
-            f"export const BAP_STEPS = {{ {steps} }};",
-            "/** Default limits of FAPs 3 to 68, up and down, in I planes and in P planes. */",
-            f"export const FAP_LIMITS = [{_list(limits[0, FAPS])}, {_list(limits[2, FAPS])}];",
-            "/** Default limits of BAPs 1 to 186: I max, I min, P max, P min, as magnitudes. */",
-            f"export const BAP_LIMITS = [{', '.join(map(_list, baps))}];",
+            "/** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py: a digit in base 36 for each parameter. */",
+            "",
+            "/** Groups of FAPs 1 to 68 and of BAPs 1 to 296, from 0. */",
+            f"export const FAP_GROUPS = {_groups(fap_groups())};",
+            f"export const BAP_GROUPS = {_groups(bap_groups())};",
+            "/** Quantiser steps, as places in this list, of FAPs 3 to 68 and of BAPs 1 to 186; 1 for later ones. */",
+            f"export const STEPS = {steps};",
+            f"export const FAP_STEPS = {_digits(map(steps.index, faps.tolist()))};",
+            f"export const BAP_STEPS = {{\n{bap_tables},\n}};",
+            "/** Default limits, in units of 60, of FAPs 3 to 68, up and down, in I planes and in P planes. */",
+            f"export const FAP_LIMITS = [{_digits(limits[0, FAPS])}, {_digits(limits[2, FAPS])}];",
+            "/** Those of BAPs 1 to 186: in I planes up, in I planes down, in P planes up and down; as magnitudes. */",
+            f"export const BAP_LIMITS = [{', '.join(map(_digits, (i_max, i_min, p_max)))}];",
             "",
         ]
     )
@@ -42,7 +52,7 @@ def make_tables() -> str:
 
 def make_figure_tables() -> str:
     """Return the JavaScript module of the figure."""
-    columns = ",\n  ".join(_list(column) for column in donors())
+    columns = ",\n  ".join(str(column.tolist()) for column in donors())
     return (
         "/** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py. */\n"
         "/** Columns of the FAPs that each unsent FAP copies: its mate, its lip mate, and the mate of that. */\n"
@@ -50,8 +60,14 @@ def make_figure_tables() -> str:
     )
 
 
-def _list(values: Iterable[int]) -> str:
-    return json.dumps([int(value) for value in values])
+def _groups(groups: Sequence[Sequence[int]]) -> str:
+    assert all(list(group) == sorted(group) for group in groups)
+    group_of = {number: place for place, group in enumerate(groups) for number in group}
+    return _digits(group_of[number] for number in sorted(group_of))
+
+
+def _digits(values: Iterable[int]) -> str:
+    return '"' + "".join("0123456789abcdefghijklmnopqrstuvwxyz"[value] for value in values) + '"'
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import { Decoder, FbaError } from "./fba.js";
 
 const [input, output, bapSteps] = process.argv.slice(2);
 const lines = ["fba-values 1"];
-const decoder = new Decoder({ bapSteps: /** @type {"iso" | "visage"} */ (bapSteps ?? "iso") });
+const decoder = new Decoder({ bapSteps: /** @type {"iso" | "visage" | undefined} */ (bapSteps) });
 let status = 0;
 try {
   for (const frame of decoder.push(readFileSync(input))) addPlane(frame);
@@ -18,7 +18,7 @@ try {
 writeFileSync(output, [...lines, "end", ""].join("\n"));
 process.exitCode = status;
 
-/** @param {import("./decoder/animation.js").StreamFrame} frame */
+/** @param {import("./decoder/frames.js").StreamFrame} frame */
 function addPlane({ time, face, body }) {
   lines.push("plane", `time ${time.toFixed(9)}`);
   if (face?.mask[0]) lines.push(`viseme ${face.viseme.join(" ")}`);

@@ -1,3 +1,4 @@
 /** A decoder of MPEG-4 Face and Body Animation streams (ISO/IEC 14496-2, FBA object), without dependencies. */
-export { Animation, Decoder, decode } from "./decoder/animation.js";
+export { Animation, decode } from "./decoder/animation.js";
 export { FbaError } from "./decoder/errors.js";
+export { Decoder } from "./decoder/stream.js";

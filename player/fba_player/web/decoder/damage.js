@@ -14,9 +14,9 @@ export class DamageLog {
     /** @type {Damage[]} */
     this.damage = [];
     /** Whether the last damage is over, but no plane behind it was decoded yet. */
-    this.resuming = false;
-    /** @type {number[]} */
-    this._recent = []; // first bits of the last planes
+    this._resuming = false;
+    /** First bits of the last planes: damage here would make them doubtful. @type {number[]} */
+    this._recent = [];
     /** @type {number[]} */
     this._recentSkips = [];
     this._bits = 0;
@@ -24,77 +24,61 @@ export class DamageLog {
     this._lostFrom = 0; // first byte of all damage since the last plane
   }
 
-  /** Start of the first plane that would be doubtful if there were damage here. */
-  get firstDoubtfulBit() {
-    return this._recent.length ? this._recent[0] : null;
+  get _last() {
+    return this.damage[this.damage.length - 1];
   }
 
-  /** Count planes. @param {Float64Array} borders bits of the stream @param {Float64Array} skips */
-  addPlanes(borders, skips) {
-    const count = skips.length;
-    const keep = Math.max(count - DOUBTFUL, 0);
-    this._recent = [...this._recent, ...borders.subarray(keep, count)].slice(-DOUBTFUL);
-    this._recentSkips = [...this._recentSkips, ...skips.subarray(keep)].slice(-DOUBTFUL);
-    this._bits += borders[count] - borders[0];
-    this._frames += skips.reduce((sum, skip) => sum + skip + 1, 0);
+  /** @param {number} bit @param {number} stop bit behind the plane @param {number} skip */
+  _addPlane(bit, stop, skip) {
+    if (this._recent.push(bit) > DOUBTFUL) this._recent.shift();
+    if (this._recentSkips.push(skip) > DOUBTFUL) this._recentSkips.shift();
+    this._bits += stop - bit;
+    this._frames += skip + 1;
   }
 
   /** Count no plane so far as doubtful: it ended where a start code begins. */
-  confirmPlanes() {
+  _confirmPlanes() {
     this._recent = [];
     this._recentSkips = [];
   }
 
   /**
    * Add damage that planes before and behind it are not lost with.
-   * @param {Damage["error"]} error @param {number} start
-   * @param {{stop?: number, framesLost?: number, doubtful?: [number, number]}} [details]
+   * @param {Damage["error"]} error @param {number} start @param {number} [stop] @param {number | null} [framesLost]
+   * @param {number} [first] doubtful plane @param {number} [behind] the last
    */
-  add(error, start, { stop = start, framesLost, doubtful } = {}) {
-    const uncertainty = framesLost === undefined ? null : 0;
-    this.damage.push({ error, start, stop, framesLost: framesLost ?? null, uncertainty, doubtful: range(doubtful) });
+  _add(error, start, stop = start, framesLost = null, first = 0, behind = 0) {
+    const uncertainty = framesLost === null ? null : 0;
+    this.damage.push({ error, start, stop, framesLost, uncertainty, doubtful: first < behind ? [first, behind] : null });
   }
 
   /** Add damage in the plane at a byte. @param {Damage["error"]} error @param {number} byte @param {number} planes before it */
-  begin(error, byte, planes) {
-    if (this.resuming) Object.assign(this.last, { framesLost: 0, uncertainty: 0 });
+  _begin(error, byte, planes) {
+    if (this._resuming) this._last.framesLost = this._last.uncertainty = 0;
     else this._lostFrom = byte;
-    this.add(error, byte, { doubtful: [planes - this._recent.length, planes] });
-    this.resuming = true;
+    this._add(error, byte, byte, null, planes - this._recent.length, planes);
+    this._resuming = true;
     this._recent = [];
   }
 
-  get last() {
-    return this.damage[this.damage.length - 1];
-  }
-
   /** Set the end of the last damage. @param {number} byte */
-  end(byte) {
-    Object.assign(this.last, { start: Math.min(this.last.start, byte), stop: byte });
+  _end(byte) {
+    this._last.start = Math.min(this._last.start, byte);
+    this._last.stop = byte;
   }
 
   /** A plane was decoded behind the damage, or nothing follows. @param {[number, number] | null} lost frames, uncertainty */
-  resume(lost) {
-    Object.assign(this.last, { framesLost: lost?.[0] ?? null, uncertainty: lost?.[1] ?? null });
-    this.resuming = false;
+  _resume(lost) {
+    [this._last.framesLost, this._last.uncertainty] = lost ?? [null, null];
+    this._resuming = false;
     this._recentSkips = [];
   }
 
   /** Return about how many frames were lost since the last plane, and the uncertainty. @returns {[number, number] | null} */
-  estimate() {
+  _estimate() {
     if (!this._frames) return null;
-    const bytes = Math.max(this.last.stop - this._lostFrom, 0);
-    const frames = roundToEven((8 * bytes * this._frames) / this._bits);
+    const share = (8 * Math.max(this._last.stop - this._lostFrom, 0) * this._frames) / this._bits;
+    const frames = share % 2 === 0.5 ? share - 0.5 : Math.round(share); // halves go to the even number
     return [frames, 1 + Math.ceil(frames / 2) + this._recentSkips.reduce((sum, skip) => sum + skip, 0)];
   }
-}
-
-/** @param {[number, number] | undefined} planes */
-const range = (planes) => (planes && planes[0] < planes[1] ? planes : null);
-
-/** @param {number} number */
-function roundToEven(number) {
-  const below = Math.floor(number);
-  const rest = number - below;
-  return rest > 0.5 || (rest === 0.5 && below % 2) ? below + 1 : below;
 }

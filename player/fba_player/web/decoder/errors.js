@@ -1,25 +1,26 @@
-/** Which kind of fault an {@link FbaError} reports. @typedef {"damage" | "unsupported" | "limit" | "option"} Kind */
+/** The kinds of errors: of the stream, of what is not supported, of a limit, of an argument. @typedef {"damage" | "unsupported" | "limit" | "option"} Kind */
 
 /** A stream, or an argument, that cannot be used: the message says where, what was found, and what helps. */
 export class FbaError extends Error {
   /**
    * @param {Kind} kind
    * @param {string} finding what was found, and what was expected
-   * @param {{plane?: number, bit?: number, remedy?: string}} [place] plane: from 0. bit: from the start of the stream
+   * @param {number} [plane] from 0
+   * @param {number} [bit] from the start of the stream
+   * @param {string} [remedy]
    */
-  constructor(kind, finding, place = {}) {
+  constructor(kind, finding, plane, bit, remedy = "") {
     const where = [];
-    if (place.plane !== undefined) where.push(`plane ${place.plane}`);
-    if (place.bit !== undefined) where.push(`bit ${place.bit} (byte ${Math.floor(place.bit / 8)})`);
-    const located = where.length ? `${where.join(", ")}: ${finding}` : finding;
-    super(place.remedy ? `${located}; ${place.remedy}` : located);
+    if (plane !== undefined) where.push(`plane ${plane}`);
+    if (bit !== undefined) where.push(`bit ${bit} (byte ${Math.floor(bit / 8)})`);
+    super((where.length ? `${where.join(", ")}: ` : "") + finding + (remedy && `; ${remedy}`));
     this.name = "FbaError";
     this.kind = kind;
     this.finding = finding;
-    /** Number of the damaged plane, from 0. @type {number | undefined} */
-    this.plane = place.plane;
-    /** Position of the damage, from the start of the stream. @type {number | undefined} */
-    this.bit = place.bit;
-    this.remedy = place.remedy ?? "";
+    /** Number of the damaged plane, from 0. */
+    this.plane = plane;
+    /** Position of the damage, from the start of the stream. */
+    this.bit = bit;
+    this.remedy = remedy;
   }
 }

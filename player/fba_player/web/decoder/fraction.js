@@ -1,28 +1,21 @@
-/** Exact fractions, in which frame rates and times are counted. */
-export class Fraction {
-  /** @param {bigint} numerator @param {bigint} [denominator] above 0 */
-  constructor(numerator, denominator = 1n) {
-    const divisor = greatestDivisor(numerator < 0n ? -numerator : numerator, denominator);
-    this.numerator = numerator / divisor;
-    this.denominator = denominator / divisor;
-  }
+const MOST = 1n << 96n; // denominator, which many odd changes of the frame rate exceed: only then fractions are rounded
+const FINE = 1n << 48n;
 
-  /** @param {number} numerator integer @param {number} [denominator] integer above 0 */
-  static of(numerator, denominator = 1) {
-    return new Fraction(BigInt(numerator), BigInt(denominator));
+/** Exact fractions, not negative, in which frame rates and times are counted. */
+export class Fraction {
+  /** @param {bigint | number} numerator integer @param {bigint | number} [denominator] integer above 0 */
+  constructor(numerator, denominator = 1) {
+    const [above, below] = [BigInt(numerator), BigInt(denominator)];
+    const divisor = greatestDivisor(above, below);
+    this.numerator = above / divisor;
+    this.denominator = below / divisor;
+    if (this.denominator > MOST) [this.numerator, this.denominator] = [(FINE * above) / below, FINE];
   }
 
   /** @param {Fraction} other */
   plus(other) {
-    return new Fraction(
-      this.numerator * other.denominator + other.numerator * this.denominator,
-      this.denominator * other.denominator,
-    );
-  }
-
-  /** @param {Fraction} other */
-  minus(other) {
-    return this.plus(new Fraction(-other.numerator, other.denominator));
+    const numerator = this.numerator * other.denominator + other.numerator * this.denominator;
+    return new Fraction(numerator, this.denominator * other.denominator);
   }
 
   /** @param {Fraction} other */
@@ -40,18 +33,9 @@ export class Fraction {
     return Number(this.numerator * other.denominator - other.numerator * this.denominator);
   }
 
-  /** @param {Fraction | null} other */
-  equals(other) {
-    return other !== null && this.numerator === other.numerator && this.denominator === other.denominator;
-  }
-
-  floor() {
-    const quotient = this.numerator / this.denominator;
-    return Number(quotient * this.denominator > this.numerator ? quotient - 1n : quotient);
-  }
-
-  ceil() {
-    return -new Fraction(-this.numerator, this.denominator).floor();
+  /** Return the whole number below, or with 1 / 2 the nearest one. @param {bigint} [up] numerator of what is added */
+  floor(up = 0n) {
+    return Number((2n * this.numerator + up * this.denominator) / (2n * this.denominator));
   }
 
   valueOf() {

@@ -2,57 +2,42 @@
  * Marks: user data behind the end code, or before the object, that name the table of BAP steps and list the CRC-32 of
  * each I period: 00 00 01 b2 "fba bap_steps=visage;crc32=2;" and the checks, four bytes each.
  */
+import { END, OBJECT_CODES, USER_DATA, findCode } from "./bits.js";
 import { BAP_STEPS } from "./tables.js";
 
-/** @typedef {import("./slots.js").BapSteps} BapSteps */
+/** @typedef {import("./parameters.js").BapSteps} BapSteps */
 
-export const USER_DATA = 0xb2;
-export const SEQUENCE = 0xb0;
-export const END = 0xb1;
-export const OBJECT_CODES = [0xba, 0x01]; // the standard's, and that of old tools
-export const PLANE_CODES = [0xbb, 0x03];
-export const LAYER_CODES = [0xb0, 0xb5]; // of a visual object sequence and a visual object: they, too, end an object
 const NAME = "fba ";
 const FIELD = /(bap_steps|crc32)=([^;=\0]{1,24});/sy;
-const SIMILAR = /fba |bap_steps=|crc32=/;
 const MOST_MARK_BYTES = 64; // within which the words of a mark are complete
 const MOST_PERIODS = 1 << 18; // that are checked: three days with an I plane every second
 
-/** Return the byte at which a start code 00 00 01 xx begins, or -1. @param {Uint8Array} data @param {number} from @param {number} stop */
-export function findCode(data, from, stop) {
-  for (let at = Math.max(from, 0); at + 3 < stop; ) {
-    const third = data[at + 2];
-    if (third > 1) at += 3;
-    else if (third === 1 && !data[at] && !data[at + 1]) return at;
-    else at += 1;
-  }
-  return -1;
-}
-
-/** @param {Uint8Array} bytes */
-const latin = (bytes) => String.fromCharCode(...bytes);
-
 /**
- * Return the table that the words of a mark name, the byte behind them, and how many checks they count.
- * @param {string} text @returns {[string | null, number, number | null]}
+ * Read the words of a mark. table: null where they name none that exists. end: byte behind them. count: of checks, null
+ * without them.
+ * @param {Uint8Array} content behind the start code
  */
-function words(text) {
-  /** @type {string | null} */
-  let table = null;
-  let end = 0;
-  if (!text.startsWith(NAME)) return [null, 0, null];
+function readWords(content) {
+  const text = String.fromCharCode(...content.subarray(0, MOST_MARK_BYTES));
+  let [named, end] = ["", 0];
+  /** @type {number | null} */
+  let count = null;
   FIELD.lastIndex = NAME.length;
-  for (let field; (field = FIELD.exec(text)); ) {
+  for (let field; text.startsWith(NAME) && (field = FIELD.exec(text)); ) {
     end = FIELD.lastIndex;
-    if (field[1] === "bap_steps") table ??= field[2];
-    else return [table, end, /^\d{1,9}$/.test(field[2]) ? Number(field[2]) : null];
+    if (field[1] === "crc32") {
+      if (/^\d{1,9}$/.test(field[2])) count = Number(field[2]);
+      break;
+    }
+    named ||= field[2];
   }
-  return [table, end, null];
+  const table = Object.hasOwn(BAP_STEPS, named) ? /** @type {BapSteps} */ (named) : null;
+  return { text, named, table, end, count };
 }
 
 /** Return how many bytes behind its start code a mark needs. @param {Uint8Array} content its beginning @param {number} most I periods */
 export function bytesNeeded(content, most) {
-  const [, end, count] = words(latin(content.subarray(0, MOST_MARK_BYTES)));
+  const { end, count } = readWords(content);
   if (count === null) return MOST_MARK_BYTES;
   return count <= most ? end + 4 * (count + 1) : end;
 }
@@ -63,24 +48,20 @@ export function bytesNeeded(content, most) {
  * @returns {{table: BapSteps | null, checks: Uint32Array | null, problems: string[]} | null}
  */
 export function readMark(content) {
-  const text = latin(content.subarray(0, MOST_MARK_BYTES));
-  const head = text.split("\0\0\x01")[0];
-  if (!NAME.startsWith(head.slice(0, NAME.length)) && !SIMILAR.test(head)) return null;
-  const [named, end, count] = words(text);
+  const { text, named, table, end, count } = readWords(content);
+  const head = text.split(/\0\0\x01/)[0];
+  if (!NAME.startsWith(head.slice(0, NAME.length)) && !/fba |bap_steps=|crc32=/.test(head)) return null;
   const problems = [];
   let checks = null;
-  if (named !== null && !(named in BAP_STEPS)) {
-    problems.push(`the stream says that it was made with the BAP steps ${named}, which are not known here`);
-  }
+  if (named && !table) problems.push(`the mark names unknown BAP steps, ${named}`);
   if (count !== null) {
     const stop = end + 4 * count;
     if (content.length < stop + 4) {
-      problems.push(`the list of ${count} checks behind the end was cut off; the stream cannot be checked`);
+      problems.push(`the mark is cut off: not all ${count} checks are there`);
     } else if (bigEndian(content, stop) !== writtenCheck(crc32(content.subarray(0, stop)))) {
-      problems.push("the mark behind the end does not match its own CRC-32; the stream cannot be checked");
-    } else checks = Uint32Array.from({ length: count }, (_, number) => bigEndian(content, end + 4 * number));
-  } else if (!end || end < head.length) problems.push("a mark of the stream was cut off or is damaged");
-  const table = named !== null && named in BAP_STEPS ? /** @type {BapSteps} */ (named) : null;
+      problems.push("the mark does not match its CRC-32: checks not used");
+    } else checks = Uint32Array.from({ length: count }, (_, place) => bigEndian(content, end + 4 * place));
+  } else if (!end || end < head.length) problems.push("the mark is cut off or damaged");
   return { table, checks, problems };
 }
 
@@ -91,21 +72,18 @@ export function readMark(content) {
 export function findMarks(data) {
   const marks = [];
   let begin = 0;
-  let object = -1;
   for (let at = findCode(data, 0, data.length); at >= 0; at = findCode(data, at + 1, data.length)) {
-    if (OBJECT_CODES.includes(data[at + 3])) object = at;
+    if (OBJECT_CODES.includes(data[at + 3])) begin = at;
     if (data[at + 3] !== END || findCode(data, at + 4, at + 8) !== at + 4 || data[at + 7] !== USER_DATA) continue;
-    const [named, end] = words(latin(data.subarray(at + 8, at + 8 + MOST_MARK_BYTES)));
-    if (named === null || !(named in BAP_STEPS)) continue;
-    const table = /** @type {BapSteps} */ (named);
-    marks.push({ table, begin: Math.max(object, begin), end: at + 8 + end });
+    const { table, end } = readWords(data.subarray(at + 8));
+    if (!table) continue;
+    marks.push({ table, begin, end: at + 8 + end });
     begin = at + 8 + end;
   }
   return marks;
 }
 
-const CRC_TABLE = Uint32Array.from({ length: 256 }, (_, byte) => {
-  let crc = byte;
+const CRC_TABLE = Uint32Array.from({ length: 256 }, (_, crc) => {
   for (let bit = 0; bit < 8; bit += 1) crc = crc & 1 ? (crc >>> 1) ^ 0xedb88320 : crc >>> 1;
   return crc;
 });
@@ -114,18 +92,14 @@ const CRC_TABLE = Uint32Array.from({ length: 256 }, (_, byte) => {
 function crc32(bytes, before = 0) {
   let crc = ~before;
   for (let at = 0; at < bytes.length; at += 1) crc = CRC_TABLE[(crc ^ bytes[at]) & 255] ^ (crc >>> 8);
-  return ~crc >>> 0;
+  return ~crc;
 }
 
-/** @param {Uint8Array} bytes @param {number} at */
-const bigEndian = (bytes, at) => new DataView(bytes.buffer, bytes.byteOffset + at, 4).getUint32(0);
+/** @param {ArrayLike<number>} bytes @param {number} at */
+const bigEndian = (bytes, at) => ((bytes[at] << 24) | (bytes[at + 1] << 16) | (bytes[at + 2] << 8) | bytes[at + 3]) >>> 0;
 
 /** Return a CRC-32 as it is written: with ff for 00, so that no start code appears. @param {number} crc */
-function writtenCheck(crc) {
-  let written = 0;
-  for (let shift = 0; shift < 32; shift += 8) written += (((crc >>> shift) & 255) || 255) * 2 ** shift;
-  return written;
-}
+const writtenCheck = (crc) => bigEndian([24, 16, 8, 0].map((shift) => (crc >>> shift) & 255 || 255), 0);
 
 /**
  * Computes the checks of an object's I periods while its bytes come: an I plane with the planes up to the next one,
@@ -136,9 +110,9 @@ export class PeriodChecks {
   /** @param {number} [byte] of the stream, at which the object begins */
   constructor(byte = 0) {
     /** Of the periods that have ended: check, first byte, first plane and plane behind the last. @type {[number, number, number, number][]} */
-    this.periods = [];
+    this._periods = [];
     /** Whether a period was abandoned. */
-    this.leftOut = false;
+    this._leftOut = false;
     this._crc = 0;
     this._start = byte;
     this._next = byte; // first byte that is not in the CRC
@@ -147,20 +121,20 @@ export class PeriodChecks {
     this._fresh = true; // whether the first period begins where the object does
   }
 
-  get full() {
-    return this.periods.length >= MOST_PERIODS;
+  get _full() {
+    return this._periods.length >= MOST_PERIODS;
   }
 
   /** Take the bytes up to `stop`. @param {Uint8Array} data from the byte `offset` of the stream @param {number} offset @param {number} stop */
-  add(data, offset, stop) {
+  _add(data, offset, stop) {
     if (stop <= this._next || !(this._open || this._fresh)) return;
     this._crc = crc32(data.subarray(this._next - offset, stop - offset), this._crc);
     this._next = stop;
   }
 
   /** Begin the next period. @param {Uint8Array} data @param {number} offset @param {number} bit @param {number} plane */
-  beginPeriod(data, offset, bit, plane) {
-    this.end(data, offset, Math.ceil(bit / 8), plane);
+  _begin(data, offset, bit, plane) {
+    this._end(data, offset, Math.ceil(bit / 8), plane);
     if (!this._fresh) {
       this._crc = 0;
       this._start = this._next = Math.floor(bit / 8);
@@ -171,35 +145,35 @@ export class PeriodChecks {
   }
 
   /** End the last period before a byte and a plane. @param {Uint8Array} data @param {number} offset @param {number} stop @param {number} plane */
-  end(data, offset, stop, plane) {
-    if (this._open && !this.full) {
-      this.add(data, offset, stop);
-      this.periods.push([writtenCheck(this._crc), this._start, this._plane, plane]);
+  _end(data, offset, stop, plane) {
+    if (this._open && !this._full) {
+      this._add(data, offset, stop);
+      this._periods.push([writtenCheck(this._crc), this._start, this._plane, plane]);
     }
     this._open = false;
   }
 
   /** Leave out the period that has begun: damage in it was noticed. */
-  abandon() {
+  _abandon() {
     this._open = this._fresh = false;
-    this.leftOut = true;
+    this._leftOut = true;
   }
 
   /** Return the periods whose checks are not in a list, in its order. @param {Uint32Array} listed */
-  wrong(listed) {
-    /** @type {Map<number, {places: number[], next: number}>} */
-    const sames = new Map();
-    listed.forEach((check, place) => {
-      if (!sames.has(check)) sames.set(check, { places: [], next: 0 });
-      sames.get(check)?.places.push(place);
-    });
+  _wrong(listed) {
+    /** Places in the list that each check has, the first one last. @type {Map<number, number[]>} */
+    const places = new Map();
+    for (let place = listed.length - 1; place >= 0; place -= 1) {
+      if (!places.get(listed[place])?.push(place)) places.set(listed[place], [place]);
+    }
     let following = 0;
-    return this.periods.filter(([check]) => {
-      const same = sames.get(check);
-      if (!same) return true;
-      while (same.places[same.next] < following) same.next += 1;
-      if (same.next === same.places.length) return true;
-      following = same.places[same.next] + 1;
+    return this._periods.filter(([check]) => {
+      const same = places.get(check) ?? [];
+      let place;
+      do place = same.pop();
+      while (place !== undefined && place < following);
+      if (place === undefined) return true;
+      following = place + 1;
       return false;
     });
   }

@@ -1,106 +1,87 @@
 /** The borders of a stream's objects, the bytes around them, and their marks. */
-import { END, SEQUENCE, USER_DATA, readMark } from "./marks.js";
+import { END, SEQUENCE, USER_DATA } from "./bits.js";
+import { readMark } from "./marks.js";
 
-/** @typedef {import("./slots.js").BapSteps} BapSteps */
+/** @typedef {import("./parameters.js").BapSteps} BapSteps */
 
 export class ObjectBorders {
-  /**
-   * @param {BapSteps | null} bapSteps the table of all objects; null: the one that a mark names
-   * @param {{table: BapSteps, begin: number, end: number}[]} marks behind the objects of the whole stream, where known
-   */
-  constructor(bapSteps, marks) {
+  /** @param {BapSteps | undefined} bapSteps the table of all objects; without, the one that a mark names */
+  constructor(bapSteps) {
     this._bapSteps = bapSteps;
-    this._marks = marks;
-    this._inUserData = false; // whether user data stand at `end`
+    /** Marks behind the objects of the whole stream, where they are known. @type {ReturnType<typeof import("./marks.js").findMarks>} */
+    this._marks = [];
+    this._inUserData = false; // whether user data stand at `_end`
     this._inHeaders = false; // whether headers of a sequence have begun, and no object in it
     /** @type {BapSteps | null} */
     this._before = null; // the table that user data in those headers name
-    this.count = 0;
+    this._count = 0;
     /** Of the last object. @type {BapSteps} */
-    this.table = bapSteps ?? "iso";
-    this.hasBody = false;
+    this._table = "iso";
+    this._hasBody = false;
     /** Last byte of the start code that ended the last object. @type {number | null} */
-    this.endCode = null;
-    this.begin = 0;
+    this._endCode = null;
+    this._begin = 0;
     /** Byte behind that code, or behind user data that follow it. */
-    this.end = 0;
+    this._end = 0;
     /** The table that its marks name. @type {BapSteps | null} */
-    this.mark = null;
+    this._mark = null;
     /** What the mark behind it lists. @type {Uint32Array | null} */
-    this.checks = null;
-  }
-
-  /** Whether an end code closed the last object. */
-  get ended() {
-    return this.endCode === END;
-  }
-
-  get size() {
-    return Math.max(this.end - this.begin, 0);
+    this._checks = null;
   }
 
   /** @param {number} byte of the stream */
-  beginObject(byte) {
-    const marked = this._marks.find((mark) => mark.begin <= byte && byte < mark.end)?.table;
-    this.table = this._bapSteps ?? this._before ?? marked ?? "iso";
-    this.count += 1;
-    this.hasBody = false;
-    this.endCode = null;
-    this.begin = byte;
-    this.mark = this._before;
-    this._before = null;
-    this.checks = null;
-    this._inHeaders = false;
+  _beginObject(byte) {
+    const behind = this._marks.find((mark) => mark.begin <= byte && byte < mark.end)?.table;
+    this._table = this._bapSteps ?? this._before ?? behind ?? "iso";
+    this._count += 1;
+    this._hasBody = this._inHeaders = false;
+    this._begin = byte;
+    this._mark = this._before;
+    this._endCode = this._before = this._checks = null;
   }
 
   /** End the object at a start code; return warnings. @param {number} code @param {number} byte behind it */
-  endObject(code, byte) {
-    this.endCode = code;
-    this.end = byte;
+  _endObject(code, byte) {
+    this._endCode = code;
+    this._end = byte;
     this._inUserData = false;
     this._inHeaders = code === SEQUENCE;
-    return this._difference("before its planes");
+    return this._difference();
   }
 
   /**
    * Take a start code outside of an object, and read the mark if it begins one; return warnings.
    * @param {number} code @param {number} byte of the stream, at which the start code stands @param {Uint8Array} content behind it
+   * @returns {string[]}
    */
-  readUserData(code, byte, content) {
-    const directly = byte === this.end && this.count > 0;
-    if (this._inUserData) this.end = byte;
-    this._inUserData = code === USER_DATA && this.count > 0 && byte === this.end;
+  _takeCode(code, byte, content) {
+    const directly = byte === this._end && this._count > 0;
+    if (this._inUserData) this._end = byte;
+    this._inUserData = code === USER_DATA && this._count > 0 && byte === this._end;
     if (code === SEQUENCE) {
       this._inHeaders = true;
       this._before = null;
     }
-    if (code !== USER_DATA || !(directly || this._inHeaders)) return [];
-    const mark = readMark(content);
+    const mark = code === USER_DATA && (directly || this._inHeaders) ? readMark(content) : null;
     if (!mark) return [];
     const { table, checks, problems } = mark;
     if (!directly) {
-      if (this._before === null || table === null || table === this._before) {
-        this._before ??= table;
-        return problems;
+      if (this._before && table && table !== this._before) {
+        problems.push(`the mark names other BAP steps, ${table}, than one before it, ${this._before}`);
       }
-      return [...problems, `the headers before the object name the BAP steps ${this._before}, and then ${table}`];
+      this._before ??= table;
+      return problems;
     }
-    if (!this.ended) return ["a mark stands behind the object, but the end code before it is damaged; it was not used"];
-    const before = this.mark;
-    this.checks = checks;
-    if (table === null || table === before) return problems;
-    this.mark = table;
-    return [...problems, ...this._difference("behind its end")];
+    if (this._endCode !== END) return ["the end code before the mark is damaged: mark not used"];
+    this._checks = checks;
+    if (!table || table === this._mark) return problems;
+    this._mark = table;
+    return [...problems, ...this._difference()];
   }
 
-  /** @param {string} where */
-  _difference(where) {
-    if (this.mark === null || this.mark === this.table || !this.hasBody) return [];
-    return [`the stream says ${where} that it was made with the BAP steps ${this.mark}; it was decoded with ${this.table}`];
-  }
-
-  /** Return how many bytes behind the last object are no user data. @param {number} length of the stream */
-  unread(length) {
-    return this._inUserData ? 0 : Math.max(length - this.end, 0);
+  /** Return a warning where the object was decoded with another table than that of its mark. */
+  _difference() {
+    if (!this._mark || this._mark === this._table || !this._hasBody) return [];
+    return [`the mark names the BAP steps ${this._mark}; decoded with ${this._table}`];
   }
 }

@@ -1,257 +1,234 @@
-/** Reads the planes of an object, an I plane or a run of P planes at a time, and keeps the state between them. */
-import { Models, OK, OUT_OF_DATA, SLOTS, readBit } from "./coder.js";
-import { BitReader, FAULTS, Fault, NO_START_CODE, OutOfData, UNDECIDED, findStartCode, readIntraHeader, readPart, readSkip } from "./header.js";
-import { BODY, FACE, FLAGS, Layout, amountLimit, bounds, defaultLimits, label, scaleOf, slotsOf, stepOf, takeRanges, undefinedBap } from "./slots.js";
+/** Reads the planes of an object (ISO/IEC 14496-2, FBA object plane), and keeps the state between them. */
+import { Fault } from "./bits.js";
+import { DAMAGED, Model, decodeSegment } from "./coder.js";
+import { Fraction } from "./fraction.js";
+import {
+  BASE, BODY, COLUMNS, DEFAULT_LIMITS, FACE, FIRST_BAP, FIRST_FAP, GROUPS, HIGHEST, LOWEST, RANGE_UNIT, SLOTS, amountLimit, label, scaleOf, stepOf,
+} from "./parameters.js";
 
-const RUN = 512; // P planes that are decoded at once, at most
-const INTRA = 4; // why a run of P planes ended, besides the faults
-const MISSING_PART = 5;
-const START_CODE = 6;
-const BAD_MASK = 7;
-const OUT_OF_RANGE = 9;
+/** @typedef {import("./bits.js").Bits} Bits */
+
+const SKIP_MAX = 15 << 20; // a week at 25 frames/s; more is damage
+const MARKER_EVERY = 4;
+const FLAG_COUNT = 3; // viseme_def, init_face, expression_def
+const NAMES = ["", "FAPs", "BAPs"];
+const LISTS = ["i_max", "i_min", "p_max", "p_min"];
 
 /**
- * An I plane, or P planes behind it. rows: count rows with the values of the slots `columns`. parts: fba_object_mask of
- * each. borders: first bit of each, and the bit behind the last. doubtful: they depend on ranges that may have been
- * replaced in a lost plane. complete: false where the plane behind them needs more data.
- * @typedef {{
- *   intra: boolean, header: import("./header.js").Header | null, face: import("./header.js").Part | null,
- *   body: import("./header.js").Part | null, columns: Int32Array, rows: Int32Array, parts: Uint8Array,
- *   skips: Float64Array, borders: Float64Array, doubtful: boolean, complete: boolean,
- * }} Planes
+ * What an I plane's header says of a part, in force until the next I plane with this part. mask: which parameters are
+ * sent. interpolated: which others are to be interpolated. slots: those that are sent, in coding order. segments: of the
+ * arithmetic coder, as [first, behind the last] of these slots, and bits that follow.
+ * @typedef {{mask: Uint8Array, interpolated: Uint8Array, slots: Int32Array, segments: [number, number, number][]}} Part
+ *
+ * seconds: since midnight.
+ * @typedef {{seconds: number, text: string, marker: number}} TimeCode
+ *
+ * A plane. face, body: null where the plane carries none. row: values of the face's slots, then of the body's, then the
+ * flags viseme_def, init_face and expression_def. bit, stop: where it lies. doubtful: it depends on ranges that may have
+ * been replaced in a lost plane. rate, timeCode: of I planes that send one.
+ * @typedef {{intra: boolean, rate: Fraction | null, timeCode: TimeCode | null, skip: number, face: Part | null,
+ *   body: Part | null, row: Int32Array, bit: number, stop: number, doubtful: boolean}} Plane
  */
 
 export class PlaneReader {
   constructor() {
-    this._models = new Models();
-    this._models.makeRoom(FLAGS);
+    /** Of the slots that were sent so far. @type {Model[]} */
+    this._models = [];
     this._minimum = [new Int32Array(SLOTS), new Int32Array(SLOTS)]; // smallest levels in P planes, in I planes
-    this._step = new Int32Array(SLOTS).fill(1);
+    this._step = new Int32Array(SLOTS);
     this._last = new Int32Array(SLOTS);
-    this._lowest = new Int32Array(SLOTS);
-    this._highest = new Int32Array(SLOTS);
-    for (let slot = 0; slot < SLOTS; slot += 1) [this._lowest[slot], this._highest[slot]] = bounds(slot);
+    // Of the plane that is being read:
     this._symbols = new Int32Array(SLOTS);
     this._values = new Int32Array(SLOTS);
-    this._flags = new Int32Array(3);
-    /** Bit or slot of the last fault. */
-    this._place = 0;
-    /** @type {import("./slots.js").BapSteps} */
+    this._flags = new Int32Array(FLAG_COUNT);
+    /** Of the object's BAP steps. @type {import("./parameters.js").BapSteps} */
     this._table = "iso";
-    this._limits = defaultLimits();
+    this._limits = DEFAULT_LIMITS.map((list) => list.slice());
+    /** Of the face at FACE, of the body at BODY. @type {(Part | undefined)[]} */
+    this._settings = [];
     this._doubtfulRanges = 0; // parts whose ranges may have been replaced in a lost plane
-    /** @type {Record<number, import("./header.js").Part>} */
-    this._settings = {};
-    /** @type {ReturnType<typeof prepareRun> | null} */
-    this._run = null;
   }
 
-  /** Reset all state. @param {import("./slots.js").BapSteps} table of the BAP steps in this object */
-  beginObject(table) {
+  /** Reset all state. @param {import("./parameters.js").BapSteps} table of the BAP steps in this object */
+  _beginObject(table) {
     this._table = table;
-    this._limits = defaultLimits();
-    this.forgetValues();
+    this._limits = DEFAULT_LIMITS.map((list) => list.slice());
+    this._forgetValues();
     this._doubtfulRanges = 0;
   }
 
   /** Reset settings behind damage: P planes are errors up to the next I plane. Ranges stay, as the best guess. */
-  forgetValues() {
-    this._settings = {};
-    this._run = null;
+  _forgetValues() {
+    this._settings = [];
     this._doubtfulRanges = FACE | BODY;
   }
 
-  /**
-   * Return the plane at a bit and the P planes that follow it. Throws OutOfData and Fault.
-   * @param {Uint8Array} data @param {number} bit @param {number} end @param {boolean} afterCode whether a start code ends here
-   * @returns {Planes}
-   */
-  read(data, bit, end, afterCode) {
-    if (bit >= end) throw new OutOfData();
-    return readBit(data, bit) ? this._readIntra(data, bit, end) : this._readPredicted(data, bit, end, afterCode);
-  }
-
-  /** @param {Uint8Array} data @param {number} start @param {number} end @returns {Planes} */
-  _readIntra(data, start, end) {
-    const reader = new BitReader(data, start + 1, end);
-    const header = readIntraHeader(reader);
-    const flags = [0, 0, 0];
-    /** @type {Record<number, import("./header.js").Part>} */
-    const settings = {};
-    /** @type {number[]} */
-    const columns = [];
-    /** @type {number[]} */
-    const row = [];
-    for (const part of [FACE, BODY]) {
-      if (!(header.mask & part)) continue;
-      settings[part] = this._readPart(reader, part);
-      const { mask } = settings[part];
-      const layout = part === FACE ? new Layout(mask, null) : new Layout(null, mask);
-      const status = this._decodeValues(data, reader.bit, end, layout, false);
-      this._check(status, reader.bit);
-      reader.bit = this._place;
-      columns.push(...layout.order);
-      row.push(...this._values.subarray(0, layout.order.length));
-      if (part === FACE) flags.splice(0, 3, ...this._flags);
+  /** Read a plane; throw OUT_OF_DATA or a Fault. @param {Bits} bits @returns {Plane} */
+  _read(bits) {
+    const bit = bits._bit;
+    const intra = bits._read(1) > 0;
+    const mask = bits._read(2);
+    if (!mask) throw new Fault("fba_object_mask is 0, expected 1 to 3", bit + 1);
+    const { rate, timeCode } = intra ? readClock(bits) : { rate: null, timeCode: null };
+    const parts = mask === 3 ? [FACE, BODY] : [mask];
+    const missing = intra ? undefined : parts.find((part) => !this._settings[part]);
+    if (missing) throw new Fault(`a P plane carries ${NAMES[missing]}, but no I plane of the object before it does`, bit);
+    const skip = bits._read(1) ? readSkip(bits) : 0;
+    /** @type {Part[]} */
+    const used = [];
+    let size = FLAG_COUNT;
+    this._flags.fill(0);
+    for (const part of parts) {
+      const settings = intra ? this._readPart(bits, part) : /** @type {Part} */ (this._settings[part]);
+      const begin = bits._bit;
+      for (const [first, stop, flags] of settings.segments) {
+        decodeSegment(bits, this._models, settings.slots, first, stop, !intra, this._symbols);
+        for (let flag = 0; flag < flags; flag += 1) this._flags[flags - 1 + flag] = bits._read(1);
+      }
+      if (intra) this._computeValues(settings.slots, true, begin);
+      used.push(settings);
+      size += settings.slots.length;
     }
-    columns.forEach((slot, position) => (this._last[slot] = row[position]));
-    if (settings[FACE]?.mask[0] || settings[FACE]?.mask[1]) {
-      columns.push(FLAGS, FLAGS + 1, FLAGS + 2);
-      row.push(...flags);
-    }
-    Object.assign(this._settings, settings);
-    this._run = null;
+    if (!intra) for (const { slots } of used) this._computeValues(slots, false, bit);
+    // Nothing is wrong with the plane: only now it changes what later ones depend on.
+    const row = new Int32Array(size);
+    let place = 0;
+    parts.forEach((part, at) => {
+      this._settings[part] = used[at];
+      for (const slot of used[at].slots) {
+        if (!intra) this._models[slot]._learn(this._symbols[slot]);
+        row[place++] = this._last[slot] = this._values[slot];
+      }
+    });
+    row.set(this._flags, place);
     return {
-      intra: true, header, face: settings[FACE] ?? null, body: settings[BODY] ?? null,
-      columns: Int32Array.from(columns), rows: Int32Array.from(row), parts: Uint8Array.of(header.mask),
-      skips: Float64Array.of(header.skip), borders: Float64Array.of(start, reader.bit),
-      doubtful: (header.mask & this._doubtfulRanges) !== 0, complete: true,
+      intra, rate, timeCode, skip, row, bit, stop: bits._bit, face: mask & FACE ? used[0] : null,
+      body: mask & BODY ? used[used.length - 1] : null, doubtful: (mask & this._doubtfulRanges) > 0,
     };
   }
 
-  /** Read the header of a part of an I plane, and apply it. @param {BitReader} reader @param {number} part */
-  _readPart(reader, part) {
-    const settings = readPart(reader, part);
-    if (settings.ranges.every((codes) => codes)) this._doubtfulRanges &= ~part;
-    takeRanges(this._limits, part, settings);
-    const [first, stop] = slotsOf(part);
-    const scale = scaleOf(part, settings.quant);
-    this._models.makeRoom(stop);
-    for (let slot = first; slot < stop; slot += 1) {
-      let [iMax, iMin, pMax, pMin] = this._limits.map((list) => Math.floor(Math.max(list[slot], 0) / scale));
-      if (slot < 7) {
-        iMax = pMax = pMin = amountLimit(slot, settings.quant);
+  /**
+   * Compute the values of symbols, which must lie within the bounds.
+   * @param {Int32Array} slots @param {boolean} intra @param {number} bit that is named in an error
+   */
+  _computeValues(slots, intra, bit) {
+    const minimum = this._minimum[Number(intra)];
+    for (let position = 0; position < slots.length; position += 1) {
+      const slot = slots[position];
+      const value = (this._symbols[slot] + minimum[slot]) * this._step[slot] + (intra ? 0 : this._last[slot]);
+      if (value < LOWEST[slot] || value > HIGHEST[slot]) {
+        throw new Fault(`${label(slot)} gets a value outside ${LOWEST[slot]}..${HIGHEST[slot]}${DAMAGED}`, bit);
+      }
+      this._values[slot] = value;
+    }
+  }
+
+  /** Read the header of a part of an I plane, and prepare the slots that it sends. @param {Bits} bits @param {number} part @returns {Part} */
+  _readPart(bits, part) {
+    const groups = GROUPS[part];
+    const columns = COLUMNS[part];
+    const mask = new Uint8Array(columns.length);
+    const interpolated = new Uint8Array(columns.length);
+    const quant = bits._read(5);
+    groups.forEach((group, number) => {
+      const type = bits._read(3) - 4; // 0 none, 1 masked, 2 masked and the others interpolated, 3 all
+      if (type < 0) throw markerFault(`before the mask type of group ${number + 1} of ${NAMES[part]}`, bits._bit - 3);
+      if (type === 2 && part === BODY) {
+        throw new Fault(`the mask type of group ${number + 1} of BAPs is 2 (interpolate), which only FAPs have`, bits._bit - 2);
+      }
+      for (const column of group) {
+        mask[column] = type % 3 ? bits._read(1) : Number(type === 3);
+        interpolated[column] = Number(type === 2 && !mask[column]);
+      }
+    });
+    if (bits._read(2) & 1) { // the bit before it is the gender
+      throw new Fault(`${NAMES[part]} are coded as DCT segments, whose tables are in no public source`, bits._bit - 1, "unsupported");
+    }
+    const sent = bits._read(4);
+    const ranges = LISTS.map((list, number) => {
+      /** Slots and their codes. @type {[number, number][]} */
+      const codes = [];
+      if (sent & (8 >> number)) {
+        for (const group of groups.slice(Number(part === FACE))) { // FAP 1 and 2 have no ranges
+          group.forEach((column, member) => {
+            if (member % MARKER_EVERY === 0 && !bits._read(1)) throw markerFault(`in the ${list} range list`, bits._bit - 1);
+            if (mask[column]) codes.push([BASE[part] + column, bits._read(5)]);
+          });
+        }
+      }
+      return codes;
+    });
+    ranges.forEach((codes, list) => codes.forEach(([slot, code]) => (this._limits[list][slot] = RANGE_UNIT * code)));
+    if (sent === 15) this._doubtfulRanges &= ~part;
+
+    let settings = this._settings[part];
+    if (!settings || !same(mask, settings.mask) || !same(interpolated, settings.interpolated)) {
+      settings = { mask, interpolated, ...layout(part, columns.filter((column) => mask[column])) };
+    }
+    const lacking = settings.slots.filter((slot) => this._limits.some((list) => slot >= FIRST_BAP && Number.isNaN(list[slot])));
+    if (lacking.length) {
+      throw new Fault(`${label(Math.min(...lacking))} is sent, but no range for it, and it has no default`, bits._bit);
+    }
+    const scale = scaleOf(part, quant);
+    for (const slot of settings.slots) {
+      let [iMax, iMin, pMax, pMin] = this._limits.map((list) => Math.floor(list[slot] / scale));
+      if (slot < FIRST_FAP) {
+        iMax = pMax = pMin = amountLimit(slot, quant);
         iMin = 0;
       }
       this._minimum[0][slot] = -pMin;
       this._minimum[1][slot] = -iMin;
-      this._step[slot] = stepOf(slot, settings.quant, this._table);
-      this._models.begin(slot, iMax + iMin + 1, pMax + pMin + 1, pMin);
+      this._step[slot] = stepOf(slot, quant, this._table);
+      (this._models[slot] ??= new Model())._begin(iMax + iMin + 1, pMax + pMin + 1, pMin);
     }
-    const bap = part === BODY ? undefinedBap(this._limits, settings.mask) : 0;
-    if (bap) throw new Fault(`BAP ${bap} is sent, but no range for it: extension BAPs have no default`, reader.bit);
     return settings;
-  }
-
-  /**
-   * Decode the segments of a plane into `_symbols`, `_values` and `_flags`; return the status. Models do not change.
-   * @param {Uint8Array} data @param {number} bit @param {number} end @param {Layout} layout @param {boolean} adaptive
-   */
-  _decodeValues(data, bit, end, layout, adaptive) {
-    const { order, segments } = layout;
-    const minimum = this._minimum[adaptive ? 0 : 1];
-    this._flags.fill(0);
-    for (const [first, stop, flags] of segments) {
-      const status = this._models.decodeSegment(data, bit, end, order, first, stop, adaptive, this._symbols);
-      bit = this._models.place;
-      this._place = bit;
-      if (status !== OK) return status;
-      if (bit + flags > end) return OUT_OF_DATA;
-      for (let flag = 0; flag < flags; flag += 1) this._flags[flags - 1 + flag] = readBit(data, bit + flag);
-      bit += flags;
-    }
-    for (let position = 0; position < order.length; position += 1) {
-      const slot = order[position];
-      const value = (this._symbols[position] + minimum[slot]) * this._step[slot] + (adaptive ? this._last[slot] : 0);
-      if (value < this._lowest[slot] || value > this._highest[slot]) {
-        this._place = slot;
-        return OUT_OF_RANGE;
-      }
-      this._values[position] = value;
-    }
-    this._place = bit;
-    return OK;
-  }
-
-  /** @param {Uint8Array} data @param {number} bit @param {number} end @param {boolean} afterCode @returns {Planes} */
-  _readPredicted(data, bit, end, afterCode) {
-    const [faceSettings, bodySettings] = [this._settings[FACE] ?? null, this._settings[BODY] ?? null];
-    this._run ??= prepareRun(faceSettings?.mask ?? null, bodySettings?.mask ?? null);
-    const { face, body, both, columns, rows } = this._run;
-    const available = (faceSettings ? FACE : 0) | (bodySettings ? BODY : 0);
-    const [parts, skips, borders] = [new Uint8Array(RUN), new Float64Array(RUN), new Float64Array(RUN + 1)];
-    const width = both.order.length;
-    let [count, carried, status, mask] = [0, 0, OK, 0];
-    borders[0] = bit;
-    for (; count < RUN; count += 1) {
-      const start = borders[count];
-      const [code] = findStartCode(data, start, end, afterCode && count === 0);
-      let skip = 0;
-      [status, mask, skip] = code === NO_START_CODE
-        ? this._readHeader(data, start, end, available)
-        : [code === UNDECIDED ? OUT_OF_DATA : START_CODE, 0, 0];
-      if (status !== OK) break;
-      const layout = mask === FACE ? face : mask === BODY ? body : both;
-      status = this._decodeValues(data, this._place, end, layout, true);
-      if (status !== OK) break;
-      const { order } = layout;
-      this._models.learn(order, 0, order.length, this._symbols);
-      const row = count * columns.length;
-      if (order.length < width) rows.fill(0, row, row + columns.length);
-      const first = row + (mask === BODY ? face.order.length : 0);
-      for (let position = 0; position < order.length; position += 1) {
-        this._last[order[position]] = rows[first + position] = this._values[position];
-      }
-      for (let flag = width; flag < columns.length; flag += 1) rows[row + flag] = this._flags[flag - width];
-      parts[count] = mask;
-      skips[count] = skip;
-      carried |= mask;
-      borders[count + 1] = this._place;
-    }
-    if (!count) {
-      if (status === MISSING_PART) {
-        const name = mask & ~available & FACE ? "FAPs" : "BAPs";
-        throw new Fault(`a P plane carries ${name}, but no I plane with ${name} came before it in this object`, bit);
-      }
-      this._check(status, bit);
-    }
-    return {
-      intra: false, header: null, face: carried & FACE ? faceSettings : null, body: carried & BODY ? bodySettings : null,
-      columns, rows: rows.slice(0, count * columns.length), parts: parts.slice(0, count), skips: skips.slice(0, count),
-      borders: borders.slice(0, count + 1), doubtful: (carried & this._doubtfulRanges) !== 0,
-      complete: status !== OUT_OF_DATA,
-    };
-  }
-
-  /**
-   * Read the header of a P plane; return [status, fba_object_mask, skip], and leave the bit behind it in `_place`.
-   * @param {Uint8Array} data @param {number} bit @param {number} end @param {number} available
-   */
-  _readHeader(data, bit, end, available) {
-    this._place = bit;
-    if (bit + 3 > end) return [OUT_OF_DATA, 0, 0];
-    if (readBit(data, bit)) return [INTRA, 0, 0];
-    const mask = 2 * readBit(data, bit + 1) + readBit(data, bit + 2);
-    this._place = bit + 1;
-    if (!mask) return [BAD_MASK, 0, 0];
-    if ((mask & available) !== mask) return [MISSING_PART, mask, 0];
-    if (bit + 4 > end) return [OUT_OF_DATA, mask, 0];
-    this._place = bit + 4;
-    if (!readBit(data, bit + 3)) return [OK, mask, 0];
-    const [status, skip, place] = readSkip(data, bit + 4, end);
-    this._place = place;
-    return [status, mask, skip];
-  }
-
-  /** Throw for a status. @param {number} status @param {number} start bit of the segments or of the plane */
-  _check(status, start) {
-    if (status === OUT_OF_DATA) throw new OutOfData();
-    if (status === OUT_OF_RANGE) {
-      const [low, high] = [this._lowest[this._place], this._highest[this._place]];
-      const finding = `${label(this._place)} gets a value outside ${low}..${high}; the stream is damaged here or before`;
-      throw new Fault(finding, start);
-    }
-    if (status in FAULTS) throw new Fault(FAULTS[status], this._place);
   }
 }
 
-/** Return layouts and rows of P planes with these masks. @param {Uint8Array | null} face @param {Uint8Array | null} body */
-function prepareRun(face, body) {
-  const both = new Layout(face, body);
-  const columns = [...both.order];
-  if (face?.[0] || face?.[1]) columns.push(FLAGS, FLAGS + 1, FLAGS + 2);
-  return {
-    face: new Layout(face, null), body: new Layout(null, body), both,
-    columns: Int32Array.from(columns), rows: new Int32Array(RUN * columns.length),
-  };
+/** @param {Uint8Array} one @param {Uint8Array} other */
+const same = (one, other) => one.every((value, at) => value === other[at]);
+
+/** Return slots and segments of the columns that are sent. @param {number} part @param {number[]} columns */
+function layout(part, columns) {
+  /** @type {[number, number, number][]} */
+  const segments = [];
+  /** @type {number[]} */
+  const slots = [];
+  const add = (/** @type {number[]} */ more, /** @type {number} */ flags) =>
+    segments.push([slots.length, slots.push(...more), flags]);
+  if (part === FACE) {
+    if (columns.includes(0)) add([0, 1, 2], 1);
+    if (columns.includes(1)) add([3, 4, 5, 6], 2);
+    columns = columns.filter((column) => column > 1);
+  }
+  add(columns.map((column) => BASE[part] + column), 0);
+  return { slots: Int32Array.from(slots), segments };
+}
+
+/** @param {string} where @param {number} bit */
+const markerFault = (where, bit) => new Fault(`marker bit ${where} is 0, expected 1`, bit);
+
+/** Read the frame rate and the time code of an I plane. @param {Bits} bits @returns {{rate: Fraction | null, timeCode: TimeCode | null}} */
+function readClock(bits) {
+  let rate = null;
+  if (bits._read(1)) {
+    const sixteenths = bits._read(12); // frame_rate and seconds, with 8 and 4 bits
+    rate = bits._read(1) ? new Fraction(sixteenths * 1000, 16 * 1001) : new Fraction(sixteenths, 16);
+    if (!sixteenths) throw new Fault("the frame rate is 0", bits._bit - 13);
+  }
+  if (!bits._read(1)) return { rate, timeCode: null };
+  const [hours, minutes, marker, seconds] = [5, 6, 1, 6].map((count) => bits._read(count));
+  const text = [hours, ...[minutes, seconds].map((part) => String(part).padStart(2, "0"))].join(":");
+  return { rate, timeCode: { seconds: (hours * 60 + minutes) * 60 + seconds, text, marker } };
+}
+
+/** Read number_of_frames_to_skip. @param {Bits} bits */
+function readSkip(bits) {
+  let skip = 0;
+  for (let word = 15; word === 15; ) {
+    word = bits._read(4);
+    skip += word;
+    if (skip > SKIP_MAX) throw new Fault(`number_of_frames_to_skip exceeds ${SKIP_MAX}`, bits._bit - 4);
+  }
+  return skip;
 }

@@ -1,55 +1,66 @@
 /** Reads a stream that arrives in pieces: outside of an object, plane by plane, and past damage. */
+import { Bits, END, Fault, LAYER_CODES, OBJECT_CODES, OUT_OF_DATA, PLANE_CODES, USER_DATA, findCode, hex } from "./bits.js";
+import { Clock } from "./clock.js";
 import { DamageLog } from "./damage.js";
 import { FbaError } from "./errors.js";
-import { Fault, NO_START_CODE, OutOfData, UNDECIDED, findStartCode } from "./header.js";
-import { END, LAYER_CODES, OBJECT_CODES, PLANE_CODES, PeriodChecks, USER_DATA, bytesNeeded, findCode } from "./marks.js";
+import { streamFrame } from "./frames.js";
+import { PeriodChecks, bytesNeeded } from "./marks.js";
 import { ObjectBorders } from "./objects.js";
 import { PlaneReader } from "./planes.js";
-import { PlaneTimes } from "./clock.js";
+import { BAP_STEPS } from "./tables.js";
 
-/** @typedef {import("./planes.js").Planes & {index: Float64Array, span: import("./clock.js").Span, number: number, startCode: boolean}} Block */
+/**
+ * A plane in the stream, where it has a number. bit: of the start code before it, if there is one.
+ * @typedef {import("./planes.js").Plane & {number: number, index: number, span: import("./clock.js").Span}} StreamPlane
+ */
 
-export const NO_END = "the stream ends without the end code 00 00 01 b1: it may have been cut off behind this plane";
+export const NO_END = "no end code 00 00 01 b1: the stream may be cut off behind this plane";
+const NO_START = "no object start code 00 00 01 ba";
 const SMALLEST = 4096; // bytes of the buffer, and those beyond which an incomplete plane is not tried with every byte
 const DAMAGE_BYTES = 1000; // memory of a damage with its error
-const FRAME_BYTES = 500; // memory of a frame without its values
+const PLANE_BYTES = 500; // memory of a plane without its values
 const GROWTH = 20; // bytes of memory that each byte of the input may take besides `mostBytes`
 
 /**
- * Throw an FbaError where something takes more memory than allowed.
- * @param {number} bytes @param {string} what @param {number} mostBytes @param {number} source bytes of the input
+ * bapSteps: the stream's table of BAP steps; by default that which its mark names, "iso" without a mark. salvage: go on
+ * behind damage, which `damage` lists. mostFrames, mostBytes: limits of what a stream, or a piece pushed, may become, the
+ * latter besides 20 bytes for each byte of it.
+ * @typedef {{bapSteps?: import("./parameters.js").BapSteps, salvage?: boolean, mostFrames?: number, mostBytes?: number}} Options
  */
-export function checkMemory(bytes, what, mostBytes, source) {
-  if (bytes <= mostBytes + GROWTH * source) return;
-  const finding = `${what} takes ${bytes} bytes of memory, more than the ${mostBytes + GROWTH * source} that mostBytes allows`;
-  throw new FbaError("limit", finding, { remedy: "if the stream is to be trusted, raise mostBytes" });
+
+/** @param {Uint8Array | ArrayBuffer} data */
+export function bytesOf(data) {
+  if (data instanceof Uint8Array) return data;
+  if (data instanceof ArrayBuffer) return new Uint8Array(data);
+  throw new FbaError("option", "expected a Uint8Array or an ArrayBuffer");
 }
 
-const hex = (/** @type {number} */ code) => code.toString(16).padStart(2, "0");
-
-export class StreamReader {
-  /**
-   * @param {import("./slots.js").BapSteps | null} bapSteps
-   * @param {boolean} salvage whether to go on behind damage
-   * @param {number} mostBytes of memory, see `Options`
-   * @param {ConstructorParameters<typeof ObjectBorders>[1]} [marks] of the whole stream, where they are known
-   */
-  constructor(bapSteps, salvage, mostBytes, marks = []) {
+/** Decodes a stream that arrives in pieces of any size, down to a byte. */
+export class Decoder {
+  /** @param {Options} [options] without bapSteps, a mark before the object names the table, "iso" without one */
+  constructor(options = {}) {
+    const { bapSteps, salvage = false, mostFrames = 6e6, mostBytes = 1e8 } = options;
+    if (bapSteps !== undefined && !Object.hasOwn(BAP_STEPS, bapSteps)) {
+      throw new FbaError("option", `bapSteps is ${JSON.stringify(bapSteps)}, expected "iso" or "visage"`);
+    }
     this._salvage = salvage;
-    this._mostBytes = mostBytes;
+    this._limits = { mostFrames, mostBytes };
     this._log = new DamageLog();
+    /** Damage so far, when salvaging. */
     this.damage = this._log.damage;
-    /** @type {string[]} */
+    /** What is odd in the stream so far. @type {string[]} */
     this.warnings = [];
     /** The error that ended the reading. @type {FbaError | null} */
-    this.error = null;
-    this.planes = 0;
-    this.times = new PlaneTimes(salvage ? this._log : null);
-    this.objects = new ObjectBorders(bapSteps, marks);
+    this._error = null;
+    this._finished = false;
+    this._planes = 0;
+    this._clock = new Clock(salvage ? this._log : null);
+    this._objects = new ObjectBorders(bapSteps);
     /** Planes of I periods that do not match their checks: first, and behind the last. @type {[number, number][]} */
-    this.wrong = [];
+    this._wrong = [];
     this._wasAtEnd = false; // whether the bytes behind an end were being read, behind damage
     this._checks = new PeriodChecks();
+    this._reader = new PlaneReader();
     this._data = new Uint8Array(SMALLEST);
     this._length = 0; // bytes in the buffer
     this._offset = 0; // bytes that were dropped before them
@@ -60,13 +71,42 @@ export class StreamReader {
     /** @type {FbaError | null} */
     this._startError = null;
     this._lostFrom = 0;
-    this._reader = new PlaneReader();
     /** @type {number | null} */
     this._codeBit = null; // where the start code before the next plane begins, in the stream
   }
 
-  /** Add bytes; return the blocks that they complete. An error is in `error` then. @param {Uint8Array} piece */
-  push(piece) {
+  /** The table of BAP steps that a mark names, or null. */
+  get mark() {
+    return this._objects._mark;
+  }
+
+  /** Whether an end code closed the last object. */
+  get ended() {
+    return this._objects._endCode === END;
+  }
+
+  /**
+   * Add bytes; return the frames that they complete. At damage, the frames before it are returned, and the next call
+   * throws the error.
+   * @param {Uint8Array | ArrayBuffer} data
+   */
+  push(data) {
+    const bytes = bytesOf(data);
+    if (this._finished) throw new FbaError("option", "this decoder is finished; make a new one");
+    this._append(bytes);
+    return this._frames(false);
+  }
+
+  /** Return the planes of a complete stream. @param {Uint8Array} bytes */
+  _readAll(bytes) {
+    this._append(bytes);
+    const planes = this._advance(false).concat(this._advance(true));
+    if (this._error) throw /** @type {FbaError} */ (this._error);
+    return planes;
+  }
+
+  /** @param {Uint8Array} piece */
+  _append(piece) {
     const need = this._length + piece.length;
     if (need > this._data.length) {
       const old = this._data.subarray(0, this._length);
@@ -75,24 +115,63 @@ export class StreamReader {
     }
     this._data.set(piece, this._length);
     this._length = need;
-    const blocks = this._advance(false);
-    if (!this.error) this._dropBytes();
-    return blocks;
   }
 
-  /** End the stream; return the last blocks. An error is in `error` then. */
+  /** End the stream; return the last frames. Throws where the stream ends inside a plane. */
   finish() {
-    return this._advance(true);
+    return this._finished && !this._error ? [] : this._frames(true);
+  }
+
+  /** Return the frames of the bytes so far. @param {boolean} final @returns {import("./frames.js").StreamFrame[]} */
+  _frames(final) {
+    if (this._error) throw this._error;
+    this._finished = final;
+    const frames = this._advance(final).map(streamFrame);
+    if (this._error && (final || !frames.length)) throw /** @type {FbaError} */ (this._error);
+    return frames;
+  }
+
+  /** Return the planes of the bytes so far; an error is in `_error` then. @param {boolean} final whether no more bytes come */
+  _advance(final) {
+    /** @type {StreamPlane[]} */
+    const planes = [];
+    const { mostFrames, mostBytes } = this._limits;
+    const most = mostBytes + GROWTH * this._length;
+    let memory = 0;
+    while (!this._error) {
+      this._lostFrom = this._bit;
+      try {
+        const plane = this._state(final);
+        if (plane === null) break;
+        if (plane) {
+          planes.push(plane);
+          memory += PLANE_BYTES + plane.row.byteLength;
+        }
+        const [limit, name] =
+          planes.length > mostFrames ? [mostFrames, "mostFrames"]
+          : memory + DAMAGE_BYTES * this.damage.length > most + GROWTH * this._offset ? [most, "mostBytes"]
+          : [0, ""];
+        if (name) {
+          const remedy = `raise ${name} if the stream is to be trusted`;
+          throw new FbaError("limit", `the stream exceeds a limit, ${limit}`, undefined, undefined, remedy);
+        }
+      } catch (error) {
+        if (!(error instanceof FbaError)) throw error;
+        if (this._salvage && error.kind !== "limit") this._skipDamage(error);
+        else this._error = error;
+      }
+    }
+    if (!this._error && !final) this._dropBytes();
+    return planes;
   }
 
   /** Drop the bytes that neither the next plane needs, nor a look for start codes behind damage. */
   _dropBytes() {
-    const doubtful = this._log.firstDoubtfulBit;
-    let needed = doubtful !== null ? Math.floor(doubtful / 8) - this._offset : this._bit >> 3;
-    if (this._codeBit !== null) needed = Math.min(needed, Math.floor(this._codeBit / 8) - this._offset);
-    needed = Math.min(needed, this._bit >> 3, this._scanned || this._bit >> 3);
+    const bits = [this._bit, 8 * (this._scanned || Infinity)];
+    for (const bit of [this._codeBit, this._log._recent[0]]) bits.push((bit ?? Infinity) - 8 * this._offset);
+    const needed = Math.floor(Math.min(...bits) / 8);
     if (needed < SMALLEST || 2 * needed < this._length) return;
-    this._checks.add(this._data, this._offset, this._offset + needed);
+    this._checks._add(this._data, this._offset, this._offset + needed);
     const rest = this._data.subarray(needed, this._length);
     this._data = new Uint8Array(Math.max(2 * rest.length, SMALLEST));
     this._data.set(rest);
@@ -103,38 +182,11 @@ export class StreamReader {
     this._retryAt = Math.max(this._retryAt - needed, 0);
   }
 
-  /** @param {boolean} final whether no more bytes come */
-  _advance(final) {
-    /** @type {Block[]} */
-    const blocks = [];
-    const source = this._length;
-    let memory = 0;
-    while (!this.error) {
-      this._lostFrom = this._bit;
-      try {
-        const block = this._state(final);
-        if (block === null) break;
-        if (block) {
-          blocks.push(block);
-          memory += block.rows.byteLength + FRAME_BYTES * block.skips.length;
-          checkMemory(memory, "what one call returns", this._mostBytes, source);
-        }
-        const damages = this.damage.length;
-        checkMemory(DAMAGE_BYTES * damages, `a list of ${damages} damages`, this._mostBytes, this._offset + source);
-      } catch (error) {
-        if (!(error instanceof FbaError)) throw error;
-        if (this._salvage && error.kind !== "limit") this._skipDamage(error);
-        else this.error = error;
-      }
-    }
-    return blocks;
-  }
-
   // ---- states: each returns a block, undefined without one, or null where it needs more bytes
 
-  /** Look for the object start code; headers of other layers may come before it. @param {boolean} final @returns {Block | null | undefined} */
+  /** Look for the object start code; headers of other layers may come before it. @param {boolean} final @returns {StreamPlane | null | undefined} */
   _findObject(final) {
-    if (this.objects.count === 0 && this._offset + this._scanned === 0 && !this._startError) this._checkStart(final);
+    if (this._objects._count === 0 && this._offset + this._scanned === 0 && !this._startError) this._checkStart(final);
     for (;;) {
       const at = findCode(this._data, this._scanned, this._length);
       if (at < 0) {
@@ -143,19 +195,19 @@ export class StreamReader {
       }
       const code = this._data[at + 3];
       if (PLANE_CODES.includes(code)) {
-        if (this.objects.count || !this._salvage) throw this._outside(at, code);
+        if (this._objects._count || !this._salvage) throw this._outside(at);
         if (at + 4 >= this._length && !final) break; // the first bit of the plane is not here yet
         if (at + 4 < this._length && this._data[at + 4] & 0x80) return this._join(at);
-        this._startError ??= this._outside(at, code);
+        this._startError ??= this._outside(at);
       }
       const content = this._data.subarray(at + 4, this._length);
-      const needed = code === USER_DATA ? bytesNeeded(content, this.objects.size) : 0;
+      const needed = code === USER_DATA ? bytesNeeded(content, Math.max(this._objects._end - this._objects._begin, 0)) : 0;
       if (needed > content.length && !final) break; // a mark may not be complete
-      this.warnings.push(...this.objects.readUserData(code, this._offset + at, content.subarray(0, needed)));
+      this.warnings.push(...this._objects._takeCode(code, this._offset + at, content.subarray(0, needed)));
       this._scanned = at + 4;
       this._compareChecks();
       if (OBJECT_CODES.includes(code)) {
-        if (this._startError && this.objects.count === 0) this._log.add(this._startError, 0, { stop: this._offset + at });
+        if (this._startError && this._objects._count === 0) this._log._add(this._startError, 0, this._offset + at);
         this._bit = 8 * this._scanned;
         this._scanned = 0;
         this._beginObject(this._offset + at);
@@ -164,11 +216,11 @@ export class StreamReader {
       }
     }
     if (!final) this._bit = Math.max(this._bit, 8 * this._scanned);
-    else if (this.objects.count === 0) {
-      throw new FbaError("damage", "no FBA object start code (00 00 01 ba) in the stream", { plane: 0, bit: 0 });
+    else if (this._objects._count === 0) {
+      throw new FbaError("damage", NO_START, 0, 0);
     } else {
-      const rest = this.objects.unread(this._offset + this._length);
-      if (rest) this.warnings.push(`${rest} bytes follow the end of the FBA object; they were not read`);
+      const rest = this._objects._inUserData ? 0 : this._offset + this._length - this._objects._end;
+      if (rest > 0) this.warnings.push(`${rest} bytes behind the end: not read`);
     }
     return null;
   }
@@ -178,27 +230,25 @@ export class StreamReader {
     const head = this._data.subarray(0, Math.min(this._length, 4));
     const begins = [0, 0, 1].every((byte, place) => place >= head.length || head[place] === byte);
     if (begins && !(final && head.length < 4)) return;
-    const found = head.length ? `it begins with ${[...head].map(hex).join(" ")}` : "it is empty";
-    const finding = `no FBA stream: expected the object start code 00 00 01 ba, but ${found}`;
-    this._startError = new FbaError("damage", finding, { plane: 0, bit: 0 });
+    this._startError = new FbaError("damage", `${NO_START}: the stream begins with ${[...head].map(hex).join(" ") || "nothing"}`, 0, 0);
     if (!this._salvage) throw this._startError;
   }
 
   /** Compare the I periods of an object with the checks behind it, if any. */
   _compareChecks() {
-    const listed = this.objects.checks;
-    this.objects.checks = null;
+    const listed = this._objects._checks;
+    this._objects._checks = null;
     if (!listed) return;
     const checks = this._checks;
-    const wrong = checks.wrong(listed);
+    const wrong = checks._wrong(listed);
     for (const [, start, first, stop] of wrong) {
-      const finding = `the I period of planes ${first}..${stop - 1} does not match its CRC-32: a part of it is wrong`;
+      const finding = `planes ${first} to ${stop - 1} do not match their CRC-32`;
       this._reportWrong(finding, [first, stop], start);
     }
-    const missing = listed.length - checks.periods.length;
-    if (missing > 0 && !(checks.full || checks.leftOut || wrong.length)) {
-      const finding = `${missing} of ${listed.length} I periods of the object are missing`;
-      this._reportWrong(finding, [this.planes, this.planes], this.objects.begin);
+    const missing = listed.length - checks._periods.length;
+    if (missing > 0 && !(checks._full || checks._leftOut || wrong.length)) {
+      const finding = `${missing} of ${listed.length} I periods are missing`;
+      this._reportWrong(finding, [this._planes, this._planes], this._objects._begin);
     }
     this.damage.sort((one, other) => one.start - other.start);
     this._checks = new PeriodChecks();
@@ -206,77 +256,90 @@ export class StreamReader {
 
   /** @param {string} finding @param {[number, number]} planes @param {number} byte */
   _reportWrong(finding, planes, byte) {
-    const error = new FbaError("damage", finding, { plane: planes[0], bit: 8 * byte });
+    const error = new FbaError("damage", finding, planes[0], 8 * byte);
     if (!this._salvage) throw error;
-    this._log.add(error, byte, { doubtful: planes });
-    if (planes[0] < planes[1]) this.wrong.push(planes);
+    this._log._add(error, byte, byte, null, ...planes);
+    if (planes[0] < planes[1]) this._wrong.push(planes);
   }
 
   /** Begin at an I plane of an object whose start is missing. @param {number} at byte of its start code @returns {undefined} */
   _join(at) {
-    const missing = "the object start code 00 00 01 ba is missing";
-    const error = this._startError ?? new FbaError("damage", missing, { plane: 0, bit: 0 });
+    const error = this._startError ?? new FbaError("damage", NO_START, 0, 0);
     this._beginObject(this._offset + at);
-    this._reader.forgetValues();
-    this._checks.abandon();
-    this._log.add(error, 0, { stop: this._offset + at });
+    this._reader._forgetValues();
+    this._checks._abandon();
+    this._log._add(error, 0, this._offset + at);
     this._bit = 8 * at;
     this._scanned = 0;
     this._state = this._decodePlanes;
   }
 
-  /** Decode the next planes, or the next start code. @param {boolean} final @returns {Block | null | undefined} */
+  /** Decode the next planes, or the next start code. @param {boolean} final @returns {StreamPlane | null | undefined} */
   _decodePlanes(final) {
-    const end = 8 * this._length;
     if (this._length < this._retryAt && !final) return null;
-    const [code, after] = findStartCode(this._data, this._bit, end, this._codeBit !== null);
-    if (code === UNDECIDED) {
-      if (final) {
-        if (this.planes && this._salvage) this._reportMissingEnd();
-        this._bit = end;
-        this.objects.end = this._offset + this._length;
-        this._state = this._findObject;
-      }
-      return null;
-    }
-    if (code !== NO_START_CODE) {
-      const start = this._bit;
-      this._bit = after;
-      this._log.confirmPlanes();
-      if (!PLANE_CODES.includes(code)) {
-        this._codeBit = null;
-        this._checks.end(this._data, this._offset, this._absolute(after) / 8 - 4, this.planes);
-      } else this._codeBit ??= this._absolute(start);
-      if (OBJECT_CODES.includes(code)) this._beginObject(this._absolute(after) / 8 - 4);
-      else if (!PLANE_CODES.includes(code)) this._endObject(code);
-      return undefined;
-    }
+    const bits = new Bits(this._data, this._bit, 8 * this._length);
+    const position = (/** @type {number} */ bit) => bit + 8 * this._offset; // in the stream
+    let inPlane = false;
     try {
-      const planes = this._reader.read(this._data, this._bit, end, this._codeBit !== null);
-      if (!planes.skips.length) return undefined;
-      const block = this._block(planes);
-      if (!planes.complete) this._awaitBytes();
-      return block;
-    } catch (error) {
-      if (error instanceof Fault) {
-        const kind = error.unsupported ? "unsupported" : "damage";
-        throw new FbaError(kind, error.message, { plane: this.planes, bit: this._absolute(error.bit) });
+      const code = bits._takeStartCode(this._codeBit !== null);
+      if (code !== undefined) {
+        this._takeCode(code, bits._bit);
+        return undefined;
       }
-      if (!(error instanceof OutOfData)) throw error;
+      inPlane = true;
+      return this._place(this._reader._read(bits));
+    } catch (error) {
+      if (error instanceof Fault) throw new FbaError(error._kind, error._finding, this._planes, position(error._bit));
+      if (error !== OUT_OF_DATA) throw error;
+    }
+    if (inPlane && final) {
+      this._log._confirmPlanes(); // a cut leaves the planes before it alone
+      throw new FbaError("damage", "the stream ends inside this plane", this._planes, position(bits._end));
     }
     if (final) {
-      this._log.confirmPlanes(); // a cut leaves the planes before it alone
-      const finding = "the stream ends inside this plane: it is cut off, or its last bytes are missing";
-      throw new FbaError("damage", finding, { plane: this.planes, bit: this._absolute(end) });
+      if (this._planes && this._salvage) this._reportMissingEnd();
+      this._bit = bits._end;
+      this._objects._end = this._offset + this._length;
+      this._state = this._findObject;
+    } else if (inPlane) { // with a long one, do not try again with every byte
+      const waiting = this._length - (this._bit >> 3);
+      this._retryAt = this._length + (waiting > SMALLEST ? waiting >> 2 : 1);
     }
-    this._awaitBytes();
     return null;
   }
 
-  /** Do not try the next plane again before more bytes of it come. */
-  _awaitBytes() {
-    const waiting = this._length - (this._bit >> 3);
-    this._retryAt = this._length + (waiting > SMALLEST ? waiting >> 2 : 1);
+  /** Take a start code in an object. @param {number} code @param {number} bit behind it */
+  _takeCode(code, bit) {
+    const byte = this._offset + bit / 8 - 4;
+    this._log._confirmPlanes();
+    if (PLANE_CODES.includes(code)) this._codeBit ??= this._bit + 8 * this._offset;
+    else {
+      this._codeBit = null;
+      this._checks._end(this._data, this._offset, byte, this._planes);
+    }
+    this._bit = bit;
+    if (OBJECT_CODES.includes(code)) this._beginObject(byte);
+    else if (!PLANE_CODES.includes(code)) this._endObject(code, byte);
+  }
+
+  /** Give a plane its number and its time, and move on past it. @param {import("./planes.js").Plane} plane @returns {StreamPlane} */
+  _place(plane) {
+    const number = this._planes++;
+    const bit = plane.bit + 8 * this._offset;
+    const startCode = this._codeBit !== null;
+    this._bit = plane.stop;
+    plane.stop += 8 * this._offset;
+    if (plane.intra) {
+      for (const problem of this._clock._beginIntra(plane, startCode, number, bit)) {
+        this.warnings.push(`plane ${number}, bit ${bit}: ${problem}`);
+      }
+      this._checks._begin(this._data, this._offset, bit - (startCode ? 32 : 0), number);
+    }
+    if (this._salvage) this._log._addPlane(bit, plane.stop, plane.skip);
+    plane.bit = this._codeBit ?? bit;
+    this._codeBit = null;
+    this._objects._hasBody ||= plane.body !== null;
+    return Object.assign(plane, this._clock._next(plane.skip), { number });
   }
 
   /** Look, behind damage, for the next start code of an object, or of a plane that is an I plane. @param {boolean} final @returns {undefined | null} */
@@ -289,7 +352,7 @@ export class StreamReader {
       this._scanned = at + 4;
       if (!wanted || at + 4 >= this._length) continue;
       if (PLANE_CODES.includes(code) && !(this._data[at + 4] & 0x80)) continue; // the planes that it depends on are lost
-      this._log.end(this._offset + at);
+      this._log._end(this._offset + at);
       this._bit = 8 * at;
       this._scanned = 0;
       this._state = this._decodePlanes;
@@ -298,13 +361,13 @@ export class StreamReader {
     this._scanned = Math.max(this._scanned, this._length - 3);
     this._bit = 8 * this._scanned;
     if (!final) return null;
-    const end = this._findEnd(Math.max(this._log.last.start - this._offset, 0));
-    this._log.end(this._offset + (end ?? this._length));
-    this._log.resume(end === null ? null : this._log.estimate());
-    if (end === null || !this.objects.count || this._wasAtEnd) return null;
+    const end = this._findEnd(Math.max(this._log._last.start - this._offset, 0));
+    this._log._end(this._offset + (end ?? this._length));
+    this._log._resume(end === null ? null : this._log._estimate());
+    if (end === null || !this._objects._count || this._wasAtEnd) return null;
     this._wasAtEnd = true;
     this._scanned = end;
-    this.warnings.push(...this.objects.endObject(END, this._offset + end));
+    this.warnings.push(...this._objects._endObject(END, this._offset + end));
     this._state = this._findObject;
     return undefined;
   }
@@ -320,84 +383,51 @@ export class StreamReader {
     return null;
   }
 
-  /** Return planes with their times, and move on past them. @param {import("./planes.js").Planes} planes @returns {Block} */
-  _block(planes) {
-    const borders = planes.borders.map((bit) => bit + 8 * this._offset);
-    const startCode = this._codeBit !== null;
-    if (planes.header) {
-      for (const problem of this.times.beginIntra(planes.header, startCode, this.planes, borders[0])) {
-        this.warnings.push(`plane ${this.planes}, bit ${borders[0]}: ${problem}`);
-      }
-      this._checks.beginPeriod(this._data, this._offset, borders[0] - (startCode ? 32 : 0), this.planes);
-    }
-    if (this._salvage) this._log.addPlanes(borders, planes.skips);
-    if (this._codeBit !== null) borders[0] = this._codeBit;
-    const block = { ...planes, ...this.times.advance(planes.skips), borders, number: this.planes, startCode };
-    this.planes += planes.skips.length;
-    this.objects.hasBody ||= planes.body !== null;
-    this._bit = planes.borders[planes.skips.length];
-    this._codeBit = null;
-    return block;
-  }
-
   /** @param {number} byte of the stream, at which the object begins */
   _beginObject(byte) {
-    this.objects.beginObject(byte);
+    this._objects._beginObject(byte);
     this._checks = new PeriodChecks(byte);
-    this._reader.beginObject(this.objects.table);
-    this.times.beginObject();
+    this._reader._beginObject(this._objects._table);
+    this._clock._beginObject();
     this._codeBit = null;
   }
 
-  /** End the object at a start code that is not a plane's. @param {number} code */
-  _endObject(code) {
+  /** End the object at a start code that is not a plane's. @param {number} code @param {number} byte at which it begins */
+  _endObject(code, byte) {
     if (code !== END && !LAYER_CODES.includes(code)) {
-      const finding = `start code 00 00 01 ${hex(code)} where a plane, the end code 00 00 01 b1 or a new object was expected`;
-      const error = new FbaError("damage", finding, { plane: this.planes, bit: this._absolute(this._bit - 32) });
+      const finding = `start code 00 00 01 ${hex(code)}, expected that of a plane, an object or the end`;
+      const error = new FbaError("damage", finding, this._planes, 8 * byte);
       if (this._salvage) throw error;
-      this.warnings.push(`${error.message}; the object ends there`);
+      this.warnings.push(error.message);
     }
     this._scanned = this._bit >> 3;
-    this.warnings.push(...this.objects.endObject(code, this._offset + this._scanned));
+    this.warnings.push(...this._objects._endObject(code, this._offset + this._scanned));
     this._state = this._findObject;
-  }
-
-  // ---- damage
-
-  /** Return the position in the stream of a bit in the buffer. @param {number} bit */
-  _absolute(bit) {
-    return bit + 8 * this._offset;
   }
 
   /** List damage in the plane at `_lostFrom`, and look for the next place to continue. @param {FbaError} error */
   _skipDamage(error) {
-    const begun = this.objects.count > 0;
-    const doubtful = this._log.firstDoubtfulBit;
-    this._log.begin(error, begun ? this._offset + (this._lostFrom >> 3) : 0, this.planes);
-    this._reader.forgetValues();
-    this._checks.abandon();
+    const begun = this._objects._count > 0;
+    const doubtful = this._log._recent[0];
+    this._log._begin(error, begun ? this._offset + (this._lostFrom >> 3) : 0, this._planes);
+    this._reader._forgetValues();
+    this._checks._abandon();
     this._codeBit = null;
-    if (doubtful !== null) this._scanned = Math.floor(doubtful / 8) - this._offset;
+    if (doubtful !== undefined) this._scanned = Math.floor(doubtful / 8) - this._offset;
     else this._scanned = begun ? Math.max((this._lostFrom >> 3) + 1, 0) : this._bit >> 3;
     this._state = this._resynchronise;
   }
 
-  /** @param {number} at byte of a plane start code outside of an object @param {number} code */
-  _outside(at, code) {
-    let before = "no object has begun";
-    if (this.objects.count) {
-      const end = this.objects.end;
-      before = `the object ended with start code 00 00 01 ${hex(this.objects.endCode ?? 0)} at byte ${end - 4}`;
-      this._lostFrom = 8 * (end - this._offset);
-    }
-    const finding = `plane start code 00 00 01 ${hex(code)} outside of an object: ${before}`;
-    return new FbaError("damage", finding, { plane: this.planes, bit: this._absolute(8 * at) });
+  /** @param {number} at byte of a plane start code outside of an object */
+  _outside(at) {
+    if (this._objects._count) this._lostFrom = 8 * (this._objects._end - this._offset);
+    return new FbaError("damage", "a plane outside of an object", this._planes, 8 * (this._offset + at));
   }
 
   /** List as damage that the data end without an end code. */
   _reportMissingEnd() {
     const length = this._offset + this._length;
-    const error = new FbaError("damage", NO_END, { plane: this.planes - 1, bit: 8 * length });
-    this._log.add(error, Math.min(Math.floor((this._absolute(this._bit) + 7) / 8), length), { stop: length });
+    const error = new FbaError("damage", NO_END, this._planes - 1, 8 * length);
+    this._log._add(error, Math.min(this._offset + Math.ceil(this._bit / 8), length), length);
   }
 }

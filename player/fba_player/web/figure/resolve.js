@@ -16,8 +16,7 @@ const MOST = 63;
 const FIELDS = [0, 1, 2];
 const EXPRESSION_FIELDS = [0, 1, 2, 3];
 const LARGEST = 2 ** 31 - 1;
-const GROUP_OF = new Uint8Array(FAPS);
-FAP_GROUPS.forEach((group, number) => group.forEach((fap) => (GROUP_OF[fap - 1] = number + 1)));
+const GROUP_OF = Uint8Array.from(FAP_GROUPS, (digit) => parseInt(digit, 36) + 1);
 /** Groups of the mouth, which the definition of a viseme holds: jaw and inner lip, tongue, outer lip. */
 const MOUTH = [2, 6, 8];
 
