@@ -27,6 +27,7 @@ _COMMANDS = {
     "decode": "Decode FBA streams to FAP, BAP, EPF, BVH and glTF files.",
     "convert": "Convert a file into another format.",
     "play": "Play a file in a window.",
+    "export": "Make a page that plays files in any browser, without a network.",
     "render": "Render a file to a picture or a video, without a window.",
     "verify": "Check FBA streams for damage, and compute digests of their values.",
     "stats": "Show where the bits of FBA streams go.",

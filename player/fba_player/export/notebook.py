@@ -1,4 +1,4 @@
-"""Animations in notebooks, shown as small films.
+"""Animations in notebooks, shown as a page to play, or as small films.
 
 `fba.player` calls `show_animations` when it is imported in a notebook; `fba` itself knows nothing of it.
 """
@@ -31,6 +31,10 @@ MAX_PREVIEW_RATE = Fraction(30)
 """Most frames per second."""
 MAX_FILM_BYTES = 4 << 20
 """Size of a film above which the page gets a still picture instead."""
+PAGE_WIDTH, PAGE_HEIGHT = 800, 520
+"""Size of the page of an animation, pixels."""
+MAX_PAGE_BYTES = 8 << 20
+"""Size of a page above which the notebook gets a film instead."""
 MIN_WIDTH = 16
 """Least width of a preview in pixels."""
 
@@ -140,9 +144,33 @@ class Preview:
 
 
 def show_animations(shell: Any) -> None:
-    """Make cells that end in an `Animation` show a film. shell: the InteractiveShell of IPython."""
+    """Make cells that end in an `Animation` show a page to play. shell: the InteractiveShell of IPython."""
     formatter = shell.display_formatter.formatters["text/html"]
-    formatter.for_type_by_name("fba.animation", "Animation", lambda shown: Preview(shown)._repr_html_())
+    formatter.for_type_by_name("fba.animation", "Animation", show_page)
+
+
+def show_page(animation: Animation) -> str:
+    """Return a frame with the page of `fba export` that plays an animation, as self-contained HTML.
+
+    What no stream can carry, and what would make a large page, becomes a `Preview` instead.
+    """
+    from fba_player.export.page import animation_page
+
+    caption = describe(animation)
+    if not len(animation):
+        return _figure("", caption)
+    try:
+        page = animation_page(animation)
+    except FbaError as error:
+        return _figure(Preview(animation)._repr_html_(), f"A film only: {error}")
+    if len(page) > MAX_PAGE_BYTES:
+        return Preview(animation)._repr_html_()
+    frame = (
+        f'<iframe srcdoc="{html.escape(page, quote=True)}" title="{html.escape(caption, quote=True)}" '
+        f'style="width: 100%; max-width: {PAGE_WIDTH}px; height: {PAGE_HEIGHT}px; border: 0" '
+        'sandbox="allow-scripts allow-downloads" allow="fullscreen" loading="lazy"></iframe>'
+    )
+    return _figure(frame, caption)
 
 
 def describe(animation: Animation) -> str:

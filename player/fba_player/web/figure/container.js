@@ -15,7 +15,7 @@ const MOST_NUMBERS = 64_000_000;
 
 /** @param {string} finding @returns {never} */
 export function refuse(finding) {
-  throw new FbaError("damage", `the model ${finding}`, { remedy: "make the page again with fba export" });
+  throw new FbaError("damage", `the model ${finding}`, undefined, undefined, "make the page again with fba export");
 }
 
 /** Fail unless a number of a header is finite, and whole and below a limit where one is given. @param {unknown} value @param {string} what @param {number} [limit] @returns {number} */

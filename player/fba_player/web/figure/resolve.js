@@ -8,7 +8,7 @@ import { DONORS } from "./tables.js";
  * 0 to 67 for the FAPs, 68 to 70 select1, select2, blend, 71 to 74 select1, intensity1, select2, intensity2.
  * @typedef {[number, [number, number][], [number, number] | null]} Term
  * @typedef {{column: number, source: number[], numerator: Term[], denominator: Term[]}} Link
- * @typedef {import("../decoder/animation.js").FaceFrame} FaceFrame
+ * @typedef {import("../decoder/frames.js").FaceFrame} FaceFrame
  */
 
 const FAPS = 68;

@@ -1,0 +1,233 @@
+/** The figures of a page: what a packed model is drawn as. */
+import { Figure } from "../figure/figure.js";
+import { Resolver } from "../figure/resolve.js";
+import { IDENTITY, multiply } from "./matrix.js";
+
+/**
+ * A model, and the pictures of its parts by their place among the parts of its figure.
+ * @typedef {{bytes: Uint8Array, pictures: Map<number, ImageBitmap>}} Model
+ * @typedef {import("./renderer.js").Shape} Shape
+ * @typedef {import("./camera.js").Subject} Subject
+ * @typedef {import("./timeline.js").Timeline} Timeline
+ */
+
+const MOUTH_CURVE = 0.4; // the first millimetres of an open mouth let in most of the light
+const SMALLEST_PUPIL = 0.03;
+const LARGEST_PUPIL = 0.92; // of the iris
+const OPEN_LIDS = [0, 0.5, 0.86, 0, -0.5, 0.86, 1, 0, 0.3, -1, 0, 0.3];
+const SAMPLES = 24; // moments at which the reach of a body is measured
+const FARTHEST = 4; // metres that a person moves before the camera follows
+/** Joints with a shadow: radius (m), darkness, and height at rest (m). @type {Record<string, [number, number, number]>} */
+const SHADOWS = {
+  HumanoidRoot: [0.55, 0.42, 0.97],
+  l_midtarsal: [0.2, 0.55, 0.03],
+  r_midtarsal: [0.2, 0.55, 0.03],
+  l_subtalar: [0.16, 0.4, 0.04],
+  r_subtalar: [0.16, 0.4, 0.04],
+};
+
+/** Return what gzip packed. @param {Uint8Array} bytes */
+export async function unzipped(bytes) {
+  const stream = new Blob([/** @type {BlobPart} */ (bytes)]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Return the model in a file, packed by gzip or not; its pictures are decoded. @param {Uint8Array} file @returns {Promise<Model>} */
+export async function readModel(file) {
+  const bytes = file[0] === 0x1f && file[1] === 0x8b ? await unzipped(file) : file;
+  const pictures = new Map();
+  for (const [place, { texture, name }] of new Figure(bytes).parts.entries()) {
+    if (!texture) continue;
+    try {
+      pictures.set(place, await createImageBitmap(new Blob([/** @type {BlobPart} */ (texture)]), { premultiplyAlpha: "none", colorSpaceConversion: "none" }));
+    } catch {
+      throw new Error(`the model's picture of part "${name}" cannot be decoded`);
+    }
+  }
+  return { bytes, pictures };
+}
+
+/**
+ * Return the figure that a model makes for a performance, and what resolves its FAPs.
+ * @param {Model} model @param {import("./timeline.js").Frames} [frames] of the performance; none where they are still to come
+ */
+export function makeFigure({ bytes, pictures }, frames) {
+  const figure = new Figure(bytes);
+  if (frames?.hasBody && !frames.hasFace && !figure.body) {
+    throw new Error("the stream moves a body, and this page has a head alone; make the page again with fba export");
+  }
+  return { figure: new Drawn(figure, pictures), resolver: new Resolver(figure.rules) };
+}
+
+/** A figure as it is drawn: a `Figure` of the stage. */
+class Drawn {
+  /** @param {Figure} figure @param {Map<number, ImageBitmap>} pictures */
+  constructor(figure, pictures) {
+    this._figure = figure;
+    this.hasBody = figure.body !== null;
+    this._meshes = figure.meshes.map(({ parts, positions, normals, light }, mesh) => {
+      const before = mesh ? figure.meshes[0].parts.length : 0;
+      const lit = positions.length / 3;
+      return {
+        shape: shapeOf(parts, lit, (part) => pictures.get(before + part) ?? null),
+        positions,
+        normals,
+        light: light ? light.shut.slice() : new Float32Array(4 * lit).fill(1),
+        source: light,
+        world: IDENTITY,
+        turn: [0, 0, 0],
+        centre: [0, 0, 0],
+        wrinkles: null,
+        share: 0,
+      };
+    });
+    this._feet = Object.entries(SHADOWS).flatMap(([name, shadow]) => {
+      const joint = figure.body?.names.indexOf(name) ?? -1;
+      return joint < 0 ? [] : [{ joint, shadow }];
+    });
+    this._subject = this._headSubject();
+    /** The space of the performance, before it is measured that of somebody who stands. @type {Subject | null} */
+    this.bodySubject = this.hasBody ? { centre: [0, 0.88, 0], halfHeight: 0.98, halfWidth: 0.62 } : null;
+    this.follows = this.hasBody;
+  }
+
+  /** The head at the start. */
+  get subject() {
+    return this._subject;
+  }
+
+  /** Measure the space that a performance takes. @param {Timeline} timeline */
+  measure(timeline) {
+    const [faps, baps] = [new Float32Array(68), new Float64Array(296)];
+    const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+    const count = this.hasBody ? Math.min(timeline.frames.length, SAMPLES) : 0;
+    for (let k = 0; k < count; k += 1) {
+      timeline.at(timeline.timeOf(Math.round((k * (timeline.frames.length - 1)) / Math.max(count - 1, 1))), faps, baps);
+      this._figure.show(faps, baps);
+      const joints = this._figure.body?.joints ?? [];
+      for (let at = 12; at < joints.length; at += 16) {
+        for (let axis = 0; axis < 3; axis += 1) {
+          low[axis] = Math.min(low[axis], joints[at + axis]);
+          high[axis] = Math.max(high[axis], joints[at + axis]);
+        }
+      }
+    }
+    timeline.at(timeline.start, faps, baps);
+    this._figure.show(faps, baps);
+    this._subject = this._headSubject();
+    if (!count) {
+      this.follows = false;
+      return;
+    }
+    this.follows = Math.max(...high.map((value, axis) => value - low[axis])) > FARTHEST;
+    const root = this.root;
+    const wide = this.follows ? 0.62 : Math.max(Math.hypot(high[0] - low[0], high[2] - low[2]) / 2 + 0.14, 0.62);
+    const top = this.follows ? root[1] + 0.89 : Math.max(high[1] + 0.24, 1);
+    const bottom = this.follows ? root[1] - 1.07 : Math.min(low[1] - 0.06, -0.07);
+    const [x, z] = this.follows ? [root[0], root[2]] : [(low[0] + high[0]) / 2, (low[2] + high[2]) / 2];
+    this.bodySubject = { centre: [x, (bottom + top) / 2, z], halfHeight: Math.max(((top - bottom) / 2) * 1.06, 0.9), halfWidth: wide };
+  }
+
+  /** Where the root of the body is in the last pose. */
+  get root() {
+    const joints = this._figure.body?.joints;
+    return joints ? [joints[12], joints[13], joints[14]] : [0, 0, 0];
+  }
+
+  /** @param {Float32Array} faps @param {Float64Array} baps @returns {import("./renderer.js").View} */
+  pose(faps, baps) {
+    const figure = this._figure;
+    figure.show(faps, baps);
+    for (const mesh of this._meshes) this._shade(mesh);
+    const joints = figure.body?.joints;
+    return {
+      figures: this._meshes,
+      eyes: figure.eyes.map((eye) => this._eye(eye)),
+      shadows: joints ? this._feet.map(({ joint, shadow }) => shadowOf(joints.subarray(16 * joint + 12, 16 * joint + 15), shadow)) : [],
+      ground: this.hasBody,
+      background: null,
+    };
+  }
+
+  /** Let light into an open mouth. @param {{source: import("../figure/figure.js").Light | null, light: Float32Array, share: number}} mesh */
+  _shade(mesh) {
+    const { source } = mesh;
+    if (!source?.wide) return;
+    const [upper, lower] = source.lips.map((lip) => 3 * lip);
+    const at = this._figure.face.positions;
+    const gap = Math.hypot(at[upper] - at[lower], at[upper + 1] - at[lower + 1], at[upper + 2] - at[lower + 2]);
+    const open = (gap - source.gaps[0]) / Math.max(source.gaps[1] - source.gaps[0], 1e-6);
+    const share = Math.round(Math.min(Math.max(open, 0), 1) ** MOUTH_CURVE * 100) / 100;
+    if (share === mesh.share) return;
+    mesh.share = share;
+    for (let k = 0; k < mesh.light.length; k += 1) mesh.light[k] = source.shut[k] + share * (source.wide[k] - source.shut[k]);
+  }
+
+  /** @param {import("../figure/figure.js").Eye} eye @returns {import("./renderer.js").Eye} */
+  _eye(eye) {
+    const { centre, radius } = eye;
+    const ball = multiply(eye.matrix, [radius, 0, 0, 0, 0, radius, 0, 0, 0, 0, radius, 0, centre[0], centre[1], centre[2], 1]);
+    const iris = eye.iris / 2 / radius;
+    const head = this._figure.faceMatrix;
+    const size = Math.max(Math.hypot(head[0], head[1], head[2]), 1e-9);
+    const faces = this._figure.face.positions;
+    const moved = multiply(eye.local, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, centre[0], centre[1], centre[2], 1]);
+    const lids = OPEN_LIDS.map((open, k) => {
+      const row = eye.lids[Math.floor(k / 3)];
+      return row < 0 ? open : (faces[3 * row + (k % 3)] - moved[12 + (k % 3)]) / radius;
+    });
+    return {
+      matrix: ball,
+      iris,
+      pupil: Math.min(Math.max(eye.pupil / 2 / radius, SMALLEST_PUPIL), iris * LARGEST_PUPIL),
+      lids,
+      axes: [0, 1, 2, 4, 5, 6, 8, 9, 10].map((k) => head[k] / size),
+    };
+  }
+
+  /** @returns {Subject} */
+  _headSubject() {
+    const { centre, halfHeight, halfWidth } = this._figure.subject;
+    if (!this.hasBody) return { centre: [...centre], halfHeight, halfWidth };
+    const head = this._figure.faceMatrix;
+    const size = Math.hypot(head[0], head[1], head[2]);
+    const [x, y, z] = centre;
+    const placed = [0, 1, 2].map((row) => head[row] * x + head[4 + row] * y + head[8 + row] * z + head[12 + row]);
+    return { centre: placed, halfHeight: halfHeight * size, halfWidth: halfWidth * size };
+  }
+}
+
+/** @param {Float64Array} place @param {[number, number, number]} shadow */
+function shadowOf([x, y, z], [radius, darkness, rest]) {
+  const height = Math.max(y - rest, 0);
+  return [x, z, radius * (1 + height), darkness / (1 + 4 * height)];
+}
+
+/**
+ * Return the shape of parts whose vertices follow each other.
+ * @param {import("../figure/parts.js").Part[]} parts @param {number} count of vertices @param {(part: number) => ImageBitmap | null} pictureOf
+ * @returns {Shape}
+ */
+function shapeOf(parts, count, pictureOf) {
+  const colours = new Float32Array(4 * count);
+  const texcoords = parts.some((part) => part.texcoords) ? new Float32Array(2 * count) : null;
+  const across = parts.some((part) => part.across) ? new Float32Array(8 * count) : null;
+  const triangles = [];
+  const drawn = [];
+  for (const [place, part] of parts.entries()) {
+    for (let k = 0; k < part.count; k += 1) {
+      const light = part.colours ? part.colours.subarray(3 * k, 3 * k + 3) : part.colour;
+      colours.set(light, 4 * (part.first + k));
+      colours[4 * (part.first + k) + 3] = part.glosses ? part.glosses[k] : part.gloss;
+    }
+    if (part.texcoords) texcoords?.set(part.texcoords, 2 * part.first);
+    if (part.across) across?.set(part.across, 8 * part.first);
+    const { scatter, closed, smooth, twoSided, opaque, alpha, opacity, cutoff, hair, ball } = part;
+    if (!ball) {
+      const picture = part.texcoords ? pictureOf(place) : null;
+      drawn.push({ first: triangles.length, count: part.triangles.length, picture, opaque, scatter, twoSided, closed, hairs: hair, smooth, alpha, opacity, cutoff, wrinkled: false });
+      for (const corner of part.triangles) triangles.push(corner + part.first);
+    }
+  }
+  return { count, triangles: Uint32Array.from(triangles), parts: drawn, colours, sway: new Float32Array(count).fill(1), texcoords, across, wrinklePlaces: null };
+}

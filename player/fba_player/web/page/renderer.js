@@ -1,0 +1,411 @@
+/** Draws figures with WebGL 2 and the shaders of the desktop player, so that both show the same. */
+import castFragment from "../../gl/shaders/shadow.frag";
+import castVertex from "../../gl/shaders/shadow.vert";
+import eyeFragment from "../../gl/shaders/eye.frag";
+import eyeVertex from "../../gl/shaders/eye.vert";
+import faceFragment from "../../gl/shaders/face.frag";
+import faceVertex from "../../gl/shaders/face.vert";
+import lighting from "../../gl/shaders/lighting.glsl";
+import studioFragment from "../../gl/shaders/studio.frag";
+import studioVertex from "../../gl/shaders/studio.vert";
+import { IDENTITY, invert, rotationOf } from "./matrix.js";
+
+/**
+ * A part of a figure: its triangles are indices `first` to `first + count` of the figure's; the rest as of `FaceShape` of
+ * the desktop player.
+ * @typedef {{
+ *   first: number, count: number, picture: ImageBitmap | null, opaque: boolean, scatter: number, twoSided: boolean,
+ *   closed: boolean, hairs: boolean, smooth: boolean, alpha: string, opacity: number, cutoff: number, wrinkled: boolean,
+ * }} Part
+ *
+ * What does not change of a figure of V vertices. colours: linear light and gloss, (V, 4). sway: how far a vertex turns with
+ * the head. across: of hairs, (V, 8). wrinklePlaces: (V, 2).
+ * @typedef {{
+ *   count: number, triangles: Uint32Array, parts: Part[], colours: Float32Array, sway: Float32Array,
+ *   texcoords: Float32Array | null, across: Float32Array | null, wrinklePlaces: Float32Array | null,
+ * }} Shape
+ *
+ * A figure in a pose. light: (V, 4), key light, sky, through the skin, rim light. world: where it stands. turn: axis of the
+ * head's rotation about `centre`, times its angle. wrinkles: strengths on the left and the right, four each, or null.
+ * @typedef {{
+ *   shape: Shape, positions: Float32Array, normals: Float32Array, light: Float32Array, world: import("./matrix.js").Matrix,
+ *   turn: number[], centre: number[], wrinkles: Float32Array | null,
+ * }} Posed
+ *
+ * An eyeball. matrix: from its own frame, of radius 1 and looking along +z, into the world. iris, pupil: radii. lids: (4, 3).
+ * axes: of the head, (3, 3), column after column.
+ * @typedef {{
+ *   matrix: import("./matrix.js").Matrix, iris: number, pupil: number, lids: Float32Array | number[], axes: number[],
+ * }} Eye
+ *
+ * @typedef {{
+ *   figures: Posed[], eyes: Eye[], shadows: number[][], ground: boolean, background: number[] | null,
+ * }} View
+ */
+
+const ATTRIBUTES = [
+  "in_position", "in_normal", "in_light", "in_colour", "in_texture", "in_sway", "in_wrinkle", "in_across", "in_along",
+];
+/** Pixels of blended parts with at least this opacity are drawn first, as opaque, then the others. */
+const CORE_OPACITY = 0.9;
+const TINT = [0.075, 0.105, 0.1];
+const EYE_STEPS = 32;
+
+/** Draws views on a canvas. Throws an error where there is no WebGL 2. */
+export class Renderer {
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, premultipliedAlpha: true });
+    if (!gl) {
+      throw new Error("this browser has no WebGL 2; switch on hardware acceleration, or use a newer browser");
+    }
+    this._gl = gl;
+    /** @type {Map<string, Program>} */
+    this._programs = new Map();
+    /** @type {Map<Shape, Buffers>} */
+    this._shapes = new Map();
+    /** @type {Map<ImageBitmap, WebGLTexture>} */
+    this._pictures = new Map();
+    this._sphere = sphereOf(gl);
+    this._square = arrayOf(gl, [-1, -1, 1, -1, -1, 1, 1, 1]);
+    this._triangle = arrayOf(gl, [-1, -1, 3, -1, -1, 3]);
+    this._eye = [0, 0, 0];
+    this._camera = /** @type {import("./matrix.js").Matrix} */ (IDENTITY);
+    this._pixel = 1;
+  }
+
+  /** @param {View} view @param {import("./camera.js").Camera} camera */
+  draw(view, camera) {
+    const gl = this._gl;
+    const { width, height } = gl.canvas;
+    this._eye = camera.eye;
+    this._camera = camera.matrix(width / Math.max(height, 1));
+    this._pixel = camera.pixel(height);
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.BLEND);
+    gl.disable(gl.CULL_FACE);
+    gl.disable(gl.DEPTH_TEST);
+    const [red, green, blue, alpha] = view.background ?? [0.2, 0.2, 0.2, 1];
+    gl.clearColor(red * alpha, green * alpha, blue * alpha, alpha);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (!view.background) this._drawStudio(view, camera);
+    if (view.ground) this._drawShadows(view.shadows);
+    gl.enable(gl.DEPTH_TEST);
+    for (const eye of view.eyes) this._drawEye(eye);
+    this._drawFigures(view.figures);
+  }
+
+  /** Free what belongs to figures that are no longer shown. @param {Shape[]} shown */
+  keep(shown) {
+    for (const [shape, buffers] of this._shapes) {
+      if (shown.includes(shape)) continue;
+      buffers.delete();
+      this._shapes.delete(shape);
+    }
+  }
+
+  /** @param {View} view @param {import("./camera.js").Camera} camera */
+  _drawStudio(view, camera) {
+    const program = this._use("studio", studioVertex, studioFragment);
+    program.matrix("unproject", invert(this._camera));
+    program.set("ground", Number(view.ground));
+    program.set("centre", [camera.target[0], camera.target[2]]);
+    this._gl.bindVertexArray(this._triangle);
+    this._gl.drawArrays(this._gl.TRIANGLES, 0, 3);
+  }
+
+  /** @param {number[][]} shadows x, z, radius and darkness of each */
+  _drawShadows(shadows) {
+    const gl = this._gl;
+    const program = this._use("shadow", castVertex, castFragment);
+    blend(gl);
+    gl.bindVertexArray(this._square);
+    for (const shadow of shadows) {
+      gl.vertexAttrib4fv(program.location("in_blob"), shadow);
+      gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    }
+    gl.disable(gl.BLEND);
+  }
+
+  /** @param {Eye} eye */
+  _drawEye(eye) {
+    const gl = this._gl;
+    const program = this._use("eye", eyeVertex, eyeFragment);
+    program.matrix("world", eye.matrix);
+    program.set("iris", eye.iris);
+    program.set("pupil", eye.pupil);
+    program.set("lids", eye.lids);
+    program.matrix("head", eye.axes);
+    const size = Math.max(Math.hypot(eye.matrix[0], eye.matrix[1], eye.matrix[2]), 1e-9);
+    program.matrix("ball", rotationOf(eye.matrix).map((value) => value / size));
+    program.set("tint", TINT);
+    gl.bindVertexArray(this._sphere.array);
+    gl.drawElements(gl.TRIANGLES, this._sphere.count, gl.UNSIGNED_SHORT, 0);
+  }
+
+  /** @param {Posed[]} figures */
+  _drawFigures(figures) {
+    const gl = this._gl;
+    for (const figure of figures) this._buffers(figure.shape).write(figure);
+    const all = figures.flatMap((figure) => figure.shape.parts.map((part) => /** @type {[Posed, Part]} */ ([figure, part])));
+    for (const [figure, part] of all) if (!seeThrough(part)) this._drawPart(figure, part);
+    const transparent = all.filter(([, part]) => seeThrough(part));
+    for (const [figure, part] of transparent) if (part.alpha === "blend") this._drawPart(figure, part, true);
+    blend(gl);
+    gl.depthMask(false);
+    for (const [figure, part] of transparent) this._drawPart(figure, part);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+  }
+
+  /** @param {Posed} figure @param {Part} part @param {boolean} [core] only pixels that are nearly opaque */
+  _drawPart(figure, part, core = false) {
+    const gl = this._gl;
+    const options = Object.entries({
+      SMOOTH: part.smooth,
+      HAIRS: part.hairs,
+      TEXTURED: part.picture,
+      SOLID: part.alpha === "opaque",
+      CUT: part.alpha === "mask" || core,
+      VEIL: part.alpha === "blend",
+    }).flatMap(([name, used]) => (used ? [name] : []));
+    const program = this._use("face", faceVertex, faceFragment, options);
+    program.matrix("world", figure.world);
+    program.set("turn", figure.turn);
+    program.set("centre", figure.centre);
+    program.set("scatter", part.scatter);
+    program.set("two_sided", Number(part.twoSided));
+    program.set("opacity", part.opacity);
+    program.set("cut", core ? CORE_OPACITY : part.cutoff);
+    if (part.picture) gl.bindTexture(gl.TEXTURE_2D, this._picture(part.picture));
+    if (part.closed) gl.enable(gl.CULL_FACE);
+    gl.bindVertexArray(this._buffers(figure.shape).array);
+    gl.drawElements(gl.TRIANGLES, part.count, gl.UNSIGNED_INT, 4 * part.first);
+    gl.disable(gl.CULL_FACE);
+  }
+
+  /** @param {Shape} shape */
+  _buffers(shape) {
+    let buffers = this._shapes.get(shape);
+    if (!buffers) this._shapes.set(shape, (buffers = new Buffers(this._gl, shape)));
+    return buffers;
+  }
+
+  /** @param {ImageBitmap} picture */
+  _picture(picture) {
+    let texture = this._pictures.get(picture);
+    if (!texture) this._pictures.set(picture, (texture = textureOf(this._gl, picture)));
+    return texture;
+  }
+
+  /** Return a program in use, with its camera set. @param {string} name @param {string} vertex @param {string} fragment @param {string[]} options */
+  _use(name, vertex, fragment, options = []) {
+    const key = [name, ...options].join(" ");
+    let program = this._programs.get(key);
+    if (!program) this._programs.set(key, (program = new Program(this._gl, vertex, fragment, options)));
+    this._gl.useProgram(program.program);
+    program.set("eye", this._eye);
+    program.matrix("camera", this._camera);
+    program.set("pixel", this._pixel);
+    return program;
+  }
+}
+
+/** @param {Part} part */
+function seeThrough(part) {
+  if (part.hairs) return true;
+  const pictured = part.picture !== null && !part.opaque;
+  return part.alpha === "auto" ? pictured : part.alpha === "blend" && (pictured || part.opacity < 1);
+}
+
+/** @param {WebGL2RenderingContext} gl */
+function blend(gl) {
+  gl.enable(gl.BLEND);
+  gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE);
+}
+
+/** A compiled program and the places of its uniforms. */
+class Program {
+  /** @param {WebGL2RenderingContext} gl @param {string} vertex @param {string} fragment @param {string[]} options */
+  constructor(gl, vertex, fragment, options) {
+    this._gl = gl;
+    this.program = /** @type {WebGLProgram} */ (gl.createProgram());
+    for (const [kind, text] of /** @type {[number, string][]} */ ([[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]])) {
+      const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
+      gl.shaderSource(shader, translated(text, options));
+      gl.compileShader(shader);
+      gl.attachShader(this.program, shader);
+    }
+    ATTRIBUTES.forEach((name, place) => gl.bindAttribLocation(this.program, place, name));
+    gl.bindAttribLocation(this.program, 0, "in_corner");
+    gl.linkProgram(this.program);
+    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      const logs = (gl.getAttachedShaders(this.program) ?? []).map((shader) => gl.getShaderInfoLog(shader));
+      throw new Error(`the graphics driver refuses a shader: ${[gl.getProgramInfoLog(this.program), ...logs].join(" ")}`);
+    }
+    /** @type {Map<string, {place: WebGLUniformLocation, type: number}>} */
+    this._uniforms = new Map();
+    const count = gl.getProgramParameter(this.program, gl.ACTIVE_UNIFORMS);
+    for (let k = 0; k < count; k += 1) {
+      const { name, type } = /** @type {WebGLActiveInfo} */ (gl.getActiveUniform(this.program, k));
+      const place = gl.getUniformLocation(this.program, name);
+      if (place) this._uniforms.set(name.replace("[0]", ""), { place, type });
+    }
+  }
+
+  /** @param {string} name */
+  location(name) {
+    return this._gl.getAttribLocation(this.program, name);
+  }
+
+  /** Set a uniform, if the program has it: a number or vectors. @param {string} name @param {number | ArrayLike<number>} value */
+  set(name, value) {
+    const [gl, uniform] = [this._gl, this._uniforms.get(name)];
+    if (!uniform) return;
+    const values = typeof value === "number" ? [value] : Float32Array.from(value);
+    if (uniform.type === gl.FLOAT) gl.uniform1fv(uniform.place, values);
+    else if (uniform.type === gl.FLOAT_VEC2) gl.uniform2fv(uniform.place, values);
+    else if (uniform.type === gl.FLOAT_VEC3) gl.uniform3fv(uniform.place, values);
+    else gl.uniform4fv(uniform.place, values);
+  }
+
+  /** @param {string} name @param {import("./matrix.js").Matrix} value 9 or 16 numbers */
+  matrix(name, value) {
+    const [gl, uniform] = [this._gl, this._uniforms.get(name)];
+    if (!uniform) return;
+    const values = Float32Array.from(value);
+    if (values.length === 9) gl.uniformMatrix3fv(uniform.place, false, values);
+    else gl.uniformMatrix4fv(uniform.place, false, values);
+  }
+}
+
+/** Return a shader of OpenGL 3.3 as one of WebGL 2. @param {string} text @param {string[]} options */
+function translated(text, options) {
+  const head = ["#version 300 es", "precision highp float;", "precision highp int;", ...options.map((name) => `#define ${name}`)];
+  return text.replace("#version 330 core", head.join("\n")).replace("//include lighting.glsl", lighting);
+}
+
+/** The buffers of a figure. */
+class Buffers {
+  /** @param {WebGL2RenderingContext} gl @param {Shape} shape */
+  constructor(gl, shape) {
+    this._gl = gl;
+    this.array = /** @type {WebGLVertexArrayObject} */ (gl.createVertexArray());
+    gl.bindVertexArray(this.array);
+    /** @type {WebGLBuffer[]} */
+    this._all = [];
+    const { count } = shape;
+    this._moving = [3, 3, 4].map((size, place) => this._attribute(place, size, 4 * size * count));
+    this._attribute(3, 4, shape.colours);
+    this._attribute(4, 2, shape.texcoords);
+    this._attribute(5, 1, shape.sway);
+    this._attribute(6, 2, shape.wrinklePlaces);
+    if (shape.across) {
+      const buffer = this._attribute(7, 4, shape.across, 32);
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.enableVertexAttribArray(8);
+      gl.vertexAttribPointer(8, 4, gl.FLOAT, false, 32, 16);
+    }
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this._buffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, shape.triangles, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    /** @type {(Float32Array | null)[]} */
+    this._written = [null, null, null];
+  }
+
+  /** Write what moves. @param {Posed} figure */
+  write(figure) {
+    const gl = this._gl;
+    [figure.positions, figure.normals, figure.light].forEach((values, k) => {
+      gl.bindBuffer(gl.ARRAY_BUFFER, this._moving[k]);
+      gl.bufferSubData(gl.ARRAY_BUFFER, 0, values);
+    });
+  }
+
+  delete() {
+    for (const buffer of this._all) this._gl.deleteBuffer(buffer);
+    this._gl.deleteVertexArray(this.array);
+  }
+
+  _buffer() {
+    const buffer = /** @type {WebGLBuffer} */ (this._gl.createBuffer());
+    this._all.push(buffer);
+    return buffer;
+  }
+
+  /**
+   * Return a buffer for an attribute; content: its values, a number of bytes to reserve, or null for none.
+   * @param {number} place @param {number} size @param {Float32Array | number | null} content @param {number} [stride]
+   */
+  _attribute(place, size, content, stride = 0) {
+    const gl = this._gl;
+    const buffer = this._buffer();
+    if (content === null) return buffer;
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    if (typeof content === "number") gl.bufferData(gl.ARRAY_BUFFER, content, gl.DYNAMIC_DRAW);
+    else gl.bufferData(gl.ARRAY_BUFFER, content, gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, size, gl.FLOAT, false, stride, 0);
+    return buffer;
+  }
+}
+
+/** Return the texture of a picture: square roots of linear light, as the shaders take it. @param {WebGL2RenderingContext} gl @param {ImageBitmap} picture */
+function textureOf(gl, picture) {
+  const texture = /** @type {WebGLTexture} */ (gl.createTexture());
+  const canvas = new OffscreenCanvas(picture.width, picture.height);
+  const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  context.drawImage(picture, 0, 0);
+  const pixels = context.getImageData(0, 0, picture.width, picture.height).data;
+  const roots = Uint8Array.from({ length: 256 }, (_, value) => Math.round(255 * Math.sqrt(linear(value / 255))));
+  for (let k = 0; k < pixels.length; k += 4) {
+    const alpha = pixels[k + 3] / 255;
+    for (let channel = 0; channel < 3; channel += 1) pixels[k + channel] = roots[pixels[k + channel]] * alpha;
+  }
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, picture.width, picture.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
+  gl.generateMipmap(gl.TEXTURE_2D);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+  return texture;
+}
+
+/** Return linear light of a value in sRGB, both 0..1. @param {number} value */
+function linear(value) {
+  return value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;
+}
+
+/** @param {WebGL2RenderingContext} gl @param {number[]} corners x and y */
+function arrayOf(gl, corners) {
+  const array = gl.createVertexArray();
+  gl.bindVertexArray(array);
+  gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(corners), gl.STATIC_DRAW);
+  gl.enableVertexAttribArray(0);
+  gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 0);
+  gl.bindVertexArray(null);
+  return array;
+}
+
+/** Return a sphere of radius 1. @param {WebGL2RenderingContext} gl */
+function sphereOf(gl) {
+  const [points, triangles] = [/** @type {number[]} */ ([]), /** @type {number[]} */ ([])];
+  for (let ring = 0; ring <= EYE_STEPS; ring += 1) {
+    const down = (Math.PI * ring) / EYE_STEPS;
+    for (let step = 0; step <= EYE_STEPS; step += 1) {
+      const round = (2 * Math.PI * step) / EYE_STEPS;
+      points.push(Math.sin(down) * Math.cos(round), Math.sin(down) * Math.sin(round), Math.cos(down));
+      const at = ring * (EYE_STEPS + 1) + step;
+      if (ring < EYE_STEPS && step < EYE_STEPS) triangles.push(at, at + EYE_STEPS + 1, at + 1, at + 1, at + EYE_STEPS + 1, at + EYE_STEPS + 2);
+    }
+  }
+  const array = gl.createVertexArray();
+  gl.bindVertexArray(array);
+  gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(points), gl.STATIC_DRAW);
+  gl.enableVertexAttribArray(0);
+  gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint16Array(triangles), gl.STATIC_DRAW);
+  gl.bindVertexArray(null);
+  return { array, count: triangles.length };
+}

@@ -1,0 +1,53 @@
+"""`fba-loader.js` moves the morph targets of three.js as `to_blendshapes` says."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba.capture.blendshapes import to_blendshapes
+from fba.face import Deformer, FaceModel, resolve
+from fba.rotations import matrices
+from tools.web import make_page_tables
+
+pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
+SAMPLES = Path(fba.__file__).parent / "samples"
+WEB = Path(__file__).parents[3] / "player" / "fba_player" / "web"
+
+
+@pytest.mark.parametrize(
+    ("file", "make"),
+    [
+        ("page/names.js", make_page_tables.make_names),
+        ("loader/shapes.js", make_page_tables.make_shapes),
+        ("loader/definitions.js", make_page_tables.make_definitions),
+    ],
+)
+def test_tables_are_those_of_the_library(file: str, make: object) -> None:
+    assert callable(make)
+    assert (WEB / file).read_text(encoding="utf-8") == make()
+
+
+def test_morph_targets_and_the_head_move_as_in_python(tmp_path: Path) -> None:
+    path = tmp_path / "hello.fba"
+    animation = fba.read(SAMPLES / "hello.fap")[:100]
+    fba.write(path, animation)
+    program = Path(__file__).with_name("loader_weights.mjs")
+    done = subprocess.run(["node", program, path, "25"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    rows = np.array(result["rows"])
+    motion = to_blendshapes(fba.read(path), tuple(result["names"]))
+    assert rows.shape == (100, 56)
+    assert np.abs(rows[:, :52] - motion.weights).max() < 2e-3
+    assert motion.weights.max() > 0.3
+    turned = Deformer(FaceModel.default()).head_matrices(resolve(fba.read(path).face))[:, :3, :3]
+    quaternions = rows[:, [55, 52, 53, 54]]
+    assert np.abs(matrices(quaternions) - turned).max() < 1e-3
+    assert np.abs(turned - np.eye(3)).max() > 0.05

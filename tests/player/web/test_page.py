@@ -1,0 +1,280 @@
+"""The page of `fba export` in real browsers: pictures as on the desktop, controls, hostile input."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import wave
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+import fba
+from fba.animation import Animation
+from fba.cli.main import group
+from fba_player.export.page import PageStream, make_page
+
+SAMPLES = Path(__file__).parents[3] / "fba" / "samples"
+MODULES = Path(__file__).parents[3] / "player" / "fba_player" / "web" / "node_modules"
+RUNNER = Path(__file__).with_name("browse.mjs")
+BROWSERS = {
+    "chromium": ("chromium", "chromium-browser", "google-chrome"),
+    "firefox": ("firefox-esr", "firefox"),
+}
+SIZE = (640, 480)
+PLAYER = "document.querySelector('fba-player')"
+READY = f"{PLAYER}?.readyState === 4 || {PLAYER}?.error"
+SHOWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
+
+Browse = Callable[..., dict[str, Any]]
+Step = dict[str, Any]
+
+
+def _missing(browser: str) -> str:
+    """Return what a test in a browser lacks here, or ""."""
+    if shutil.which("node") is None:
+        return "node"
+    if not (MODULES / "playwright-core").is_dir() or not (MODULES / "puppeteer-core").is_dir():
+        return "playwright-core and puppeteer-core (npm ci in player/fba_player/web)"
+    if browser == "firefox" and shutil.which("xvfb-run") is None:
+        return "xvfb-run"
+    return "" if _program(browser) else browser
+
+
+def _program(browser: str) -> str | None:
+    return next(filter(None, map(shutil.which, BROWSERS[browser])), None)
+
+
+@pytest.fixture(params=BROWSERS)
+def browse(request: pytest.FixtureRequest, tmp_path: Path) -> Browse:
+    """Take steps on a page in a browser; the results, and the errors that the page reported."""
+    browser = request.param
+    if missing := _missing(browser):
+        if os.environ.get("FBA_REQUIRE_BROWSERS"):
+            pytest.fail(f"no {missing} here")
+        pytest.skip(f"no {missing} here")
+
+    def take(page: str, steps: list[Step], size: tuple[int, int] = SIZE) -> dict[str, Any]:
+        file = tmp_path / "page.html"
+        file.write_text(page, encoding="utf-8")
+        content = {
+            "browser": browser,
+            "path": _program(browser),
+            "page": str(file),
+            "size": size,
+            "steps": steps,
+        }
+        command = ["node", str(RUNNER), str(MODULES)]
+        if browser == "firefox":
+            command = ["xvfb-run", "-a", "-s", "-screen 0 1600x1200x24", *command]
+        done = subprocess.run(
+            command, input=json.dumps(content), capture_output=True, text=True, check=False, cwd=tmp_path
+        )
+        assert done.returncode == 0, done.stderr
+        result: dict[str, Any] = json.loads(done.stdout)
+        return result
+
+    return take
+
+
+@pytest.fixture(scope="module")
+def head_page(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return _exported(tmp_path_factory.mktemp("head"), [SAMPLES / "hello.fap"])
+
+
+@pytest.fixture(scope="module")
+def hello() -> Animation:
+    return fba.read(SAMPLES / "hello.fap")
+
+
+def _exported(folder: Path, files: list[Path], *options: str) -> str:
+    out = folder / "page.html"
+    done = CliRunner().invoke(
+        group, ["export", *map(str, files), "-o", str(out), *options], catch_exceptions=False
+    )
+    assert done.exit_code == 0, done.output
+    return out.read_text(encoding="utf-8")
+
+
+def _face(path: Path) -> Any:
+    """Return the mask of a figure in a picture, and where it is dark: eyes, brows, nostrils, mouth."""
+    pixels = np.asarray(Image.open(path).convert("RGB")).astype(np.float64)
+    red, green, blue = pixels[..., 0], pixels[..., 1], pixels[..., 2]
+    return (red - blue > 18) | (np.abs(green - blue) > 25), pixels
+
+
+def _edges(mask: np.ndarray) -> np.ndarray:
+    """Return the leftmost and rightmost columns of the rows of a mask that has enough of it, -1 elsewhere."""
+    columns = np.arange(mask.shape[1])
+    wide = mask.sum(axis=1) > 20
+    left = np.where(wide, np.where(mask, columns, mask.shape[1]).min(axis=1), -1)
+    right = np.where(wide, np.where(mask, columns, -1).max(axis=1), -1)
+    return np.stack([left, right])
+
+
+def test_pictures_are_those_of_the_desktop_player(browse: Browse, head_page: str, tmp_path: Path) -> None:
+    frames = [0, 18, 40, 66, 97, 120, 151, 190]
+    steps: list[Step] = [{"wait": READY}, {"key": "h"}, {"key": "1"}]
+    for frame in frames:
+        moved = (
+            f"{PLAYER}.view = 'front', {PLAYER}.frame = {frame}, new Promise((done) => setTimeout(done, 500))"
+        )
+        steps += [{"run": moved}, {"shot": str(tmp_path / f"page{frame}.png")}]
+    assert browse(head_page, steps)["errors"] == []
+    for frame in frames:
+        theirs = tmp_path / f"desktop{frame}.png"
+        arguments = ["render", str(SAMPLES / "hello.fap"), "-o", str(theirs), "--frame", str(frame)]
+        done = CliRunner().invoke(group, [*arguments, "--camera", "front", "--size", "640x480"])
+        assert done.exit_code == 0, done.output
+        (mask, pixels), (other, other_pixels) = _face(tmp_path / f"page{frame}.png"), _face(theirs)
+        ours, desktop = _edges(mask), _edges(other)
+        both = (ours >= 0) & (desktop >= 0)
+        assert both[0].sum() > 150
+        assert np.quantile(np.abs(ours - desktop)[both], 0.95) <= 2, frame
+        inside = mask & other
+        assert np.abs(pixels - other_pixels)[inside].mean() < 8, frame
+
+
+def test_controls_by_mouse_and_keys(browse: Browse, head_page: str) -> None:
+    time, paused = f"{PLAYER}.currentTime", f"{PLAYER}.paused"
+    played = browse(
+        head_page,
+        [
+            {"wait": READY},
+            {"click": '[data-do="play"]'},
+            {"wait": f"{time} > 0.3"},
+            {"key": "Space"},
+            {"run": paused},  # 4
+            {"key": "Home"},
+            {"run": f"{PLAYER}.frame"},  # 6
+            {"key": "ArrowRight"},
+            {"key": "Shift+ArrowRight"},
+            {"run": f"{PLAYER}.frame"},  # 9
+            {"click": '[data-do="back"]'},
+            {"run": f"{PLAYER}.frame"},  # 11
+            {"click": ".track input", "at": 0.5},
+            {"run": f"{time} / {PLAYER}.duration"},  # 13
+            {"key": "["},
+            {"key": "End"},
+            {"run": f"{PLAYER}.frame === {PLAYER}.frames - 1"},  # 16
+            {"run": f"{PLAYER}.range.map((at) => at / {PLAYER}.duration)"},  # 17
+            {"click": '[data-do="loop"]'},
+            {"run": f"{PLAYER}.loop"},  # 19
+            {"key": "+"},
+            {"run": f"{PLAYER}.playbackRate"},  # 21
+            {"click": '[data-do="curves"]'},
+            {"run": f"{PLAYER}.shadowRoot.querySelector('.lanes').hidden"},  # 23
+            {"click": '[data-do="facts"]'},
+            {"run": f"{PLAYER}.shadowRoot.querySelector('.facts').textContent"},  # 25
+            {"run": f"{PLAYER}.view"},  # 26
+            {"key": "3"},
+            {"run": f"{PLAYER}.view"},  # 28
+            {"drag": [[0.5, 0.5], [0.6, 0.5]]},
+            {"run": f"{PLAYER}.view"},  # 30
+            {"key": "h"},
+            {"run": f"{PLAYER}.hasAttribute('controls')"},  # 32
+        ],
+    )
+    results = played["results"]
+    assert played["errors"] == []
+    assert results[4] is True
+    assert results[6] == 0
+    assert results[9] == 11
+    assert results[11] == 10
+    assert results[13] == pytest.approx(0.5, abs=0.03)
+    assert results[16] is True
+    assert results[17] == pytest.approx([results[13], 1], abs=1e-6)
+    assert results[19] is False, "marks of a loop switch it on, the button off"
+    assert results[21] == 1.25
+    assert results[23] is False
+    assert "241" in results[25] or "frames" in results[25]
+    assert (results[26], results[28], results[30]) == ("", "profile", "moved")
+    assert results[32] is False
+
+
+def test_a_damaged_stream_says_so_and_shows_what_is_right(browse: Browse, hello: Animation) -> None:
+    data = bytearray(fba.encode(hello, fba.EncoderOptions(intra_period=25)))
+    data[len(data) // 2] ^= 0x55
+    results = browse(
+        make_page([PageStream("damaged.fba", bytes(data))]),
+        [{"wait": READY}, {"run": f"{PLAYER}.shadowRoot.querySelector('.message').textContent"}],
+    )["results"]
+    assert "damaged" in results[1]
+
+
+@pytest.mark.parametrize("data", [b"", b"\0\0\1\xba", b"<script>alert(1)</script>" * 9])
+def test_what_is_no_stream_is_an_error_on_the_page(browse: Browse, data: bytes) -> None:
+    name = "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 1'>.fba"
+    results = browse(
+        make_page([PageStream(name, data)], title=name),
+        [
+            {"wait": READY},
+            {"run": f"{PLAYER}.error.message"},
+            {"run": "window.hacked === undefined"},
+            {"run": f"{PLAYER}.shadowRoot.querySelector('.message img, .message script') === null"},
+            {"run": "document.title"},
+        ],
+    )["results"]
+    assert results[1].startswith(name)
+    assert results[2:] == [True, True, name]
+
+
+def test_pages_hold_no_network_addresses(head_page: str) -> None:
+    assert not re.findall(r"(?:src|href)\s*=\s*[\"']?(?:https?:)?//", head_page)
+    assert "default-src 'none'" in head_page
+    assert len(head_page) < 1_200_000
+
+
+def test_ten_minutes(browse: Browse, hello: Animation) -> None:
+    assert hello.face is not None
+    count = 15_000
+    rows = np.arange(count) % len(hello)
+    track = replace(hello.face, values=hello.face.values[rows], mask=hello.face.mask[rows])
+    longer = replace(hello, index=np.arange(count), face=track)
+    data = fba.encode(longer, fba.EncoderOptions(intra_period=250))
+    results = browse(
+        make_page([PageStream("long.fba", data)]),
+        [
+            {"wait": READY},
+            {"run": f"{PLAYER}.frames"},
+            {"key": "End"},
+            {"run": f"{PLAYER}.frame"},
+            {"run": f"{PLAYER}.currentTime = 300, {PLAYER}.play(), 1"},
+            {"wait": f"{PLAYER}.currentTime > 300.5"},
+        ],
+    )["results"]
+    assert results[1] == count
+    assert results[3] == count - 1
+
+
+def test_the_sound_is_the_clock(browse: Browse, hello: Animation, tmp_path: Path) -> None:
+    with wave.open(str(tmp_path / "tone.wav"), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(8000)
+        file.writeframes(bytes(2 * 8000 * 12))
+    page = make_page([PageStream("talk.fba", fba.encode(hello))], audio=tmp_path / "tone.wav", loop=True)
+    audio = f"{PLAYER}.playback.audio"
+    results = browse(
+        page,
+        [
+            {"wait": READY},
+            {"wait": f"{audio}.readyState >= 2"},
+            {"click": '[data-do="play"]'},
+            {"wait": f"{audio}.currentTime > 0.3"},
+            {"run": f"Math.abs({audio}.currentTime - {PLAYER}.currentTime) < 0.15"},
+            {"click": '[data-do="sound"]'},
+            {"run": f"{audio}.muted"},
+        ],
+    )["results"]
+    assert results[4] is True
+    assert results[6] is True
