@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
 import json
-import re
 import shutil
 import struct
 import subprocess
@@ -19,7 +19,7 @@ import fba
 from fba.animation import Animation
 from fba.codec import Decoder, decode
 from fba.codec._decoder import read_blocks, reader_for
-from fba.errors import BitstreamError, FbaError
+from fba.errors import FbaError
 from fba.limits import DEFAULT_LIMITS
 from fba_conformance.suite.index import read_vectors
 from tools.fuzz._engine import mutated
@@ -29,6 +29,7 @@ from tools.web import make_tables
 
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
 MUTANTS = 150
+WEB = Path(__file__).parents[3] / "player" / "fba_player" / "web"
 LONGEST_BYTEWISE = 120
 """Bytes of a stream that is also pushed byte by byte: longer ones take their time in Python."""
 pytestmark = pytest.mark.filterwarnings("ignore::fba.FbaWarning")
@@ -50,20 +51,62 @@ def test_damaged_streams(tmp_path: Path) -> None:
     _compare([mutated(target, corpus, 27, number)[0] for number in range(MUTANTS)], tmp_path)
 
 
+@needs_node
+def test_the_bundle_does_what_the_sources_do(tmp_path: Path) -> None:
+    streams = [vector.data() for vector in read_vectors()]
+    bundle = tmp_path / "fba.mjs"  # the name by which node takes it for a module
+    shutil.copy(WEB / "dist" / "fba.min.js", bundle)
+    assert _found(streams, tmp_path, str(bundle)) == _found(streams, tmp_path)
+
+
+@needs_node
+def test_size() -> None:
+    """What docs/web.md says of it, in kB."""
+    assert len(gzip.compress((WEB / "dist" / "fba.min.js").read_bytes(), 9)) < 11_000
+
+
+@needs_node
+def test_mutants() -> None:
+    """Frames or an FbaError, nothing else, in time that the size of the stream bounds."""
+    program = Path(make_tables.__file__).with_name("mutants.mjs")
+    done = subprocess.run(["node", program, "300", "1"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "300 mutants, 0 failures\n")
+
+
+@needs_node
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({}, None),
+        ({0: 1}, "plane 0, bit 0 (byte 0): no object start code 00 00 01 ba: the stream begins with 01 00 01 ba"),
+    ],
+)
+def test_messages(change: dict[int, int], message: str | None, tmp_path: Path) -> None:
+    """Each says where, what was found, and what was expected."""
+
+
+@needs_node
+@pytest.mark.parametrize("only", ["valid/visage_steps", "damaged/cut"])
+def test_conformance(only: str) -> None:
+    """The program that `fba conformance --decoder` runs: a stream that needs the table of steps, and a damaged one."""
+
+
 def _compare(streams: Sequence[bytes], folder: Path) -> None:
     """Decode streams whole, salvaging and byte by byte, with both decoders; fail where they differ."""
-    file = folder / "streams"
-    file.write_bytes(b"".join(struct.pack(">I", len(stream)) + stream for stream in streams))
-    program = str(Path(__file__).with_name("decode_streams.mjs"))
-    done = subprocess.run(
-        ["node", program, file, str(LONGEST_BYTEWISE)], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    for number, (stream, line) in enumerate(zip(streams, done.stdout.splitlines(), strict=True)):
-        found = json.loads(line)
+    for number, (stream, found) in enumerate(zip(streams, _found(streams, folder), strict=True)):
         for name, salvage in (("strict", False), ("salvaged", True)):
             assert found[name] == _outcome(stream, salvage), f"stream {number}, {name}"
         assert found["bytewise"] == _bytewise(stream), f"stream {number}, byte by byte"
+
+
+def _found(streams: Sequence[bytes], folder: Path, *module: str) -> list[dict[str, Any]]:
+    file = folder / "streams"
+    file.write_bytes(b"".join(struct.pack(">I", len(stream)) + stream for stream in streams))
+    program = str(Path(__file__).with_name("decode_streams.mjs"))
+    command = ["node", program, file, str(LONGEST_BYTEWISE), *module]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
 
 
 def _outcome(stream: bytes, salvage: bool) -> dict[str, Any]:
@@ -71,7 +114,7 @@ def _outcome(stream: bytes, salvage: bool) -> dict[str, Any]:
     try:
         animation = decode(stream, on_error=on_error)
     except FbaError as error:
-        return _error(error)
+        return {"error": _place(error)}
     reader = reader_for(memoryview(stream), bap_steps=None, on_error=on_error, limits=DEFAULT_LIMITS)
     reader.times.may_step_back = True
     for _ in read_blocks(reader, memoryview(stream)):
@@ -84,8 +127,7 @@ def _outcome(stream: bytes, salvage: bool) -> dict[str, Any]:
         "damage": [
             [
                 one.start, one.stop, one.frames_lost, one.uncertainty,
-                [one.doubtful.start, one.doubtful.stop] if one.doubtful else None,
-                *[_error(one.error)[key] for key in ("plane", "bit", "error")],
+                [one.doubtful.start, one.doubtful.stop] if one.doubtful else None, _place(one.error),
             ]
             for one in reader.damage
         ],
@@ -104,16 +146,13 @@ def _bytewise(stream: bytes) -> dict[str, Any] | None:
         frames += decoder.finish()
     except FbaError as raised:
         frames += [frame for block in getattr(raised, "blocks", ()) for frame in block.frames()]
-        error = _error(raised)["error"]
+        error = _place(raised)
     rows = b"".join(_rows(frame).tobytes() for frame in frames)
     return {"frames": len(frames), "values": sha256(rows).hexdigest(), "error": error}
 
 
-def _error(error: Exception) -> dict[str, Any]:
-    text = error.message if isinstance(error, BitstreamError) else str(error).split(": ", 1)[-1]
-    text = text.partition("; it seems")[0]  # kinds of other files and names of parameters: Python's alone
-    text = re.sub(r"^(FAP|BAP) (\d+) (?!viseme_|expression_)\w+ (is sent|gets)", r"\1 \2 \3", text)
-    return {"error": text, "plane": getattr(error, "plane", None), "bit": getattr(error, "bit", None)}
+def _place(error: Exception) -> list[int | None]:
+    return [getattr(error, "plane", None), getattr(error, "bit", None)]
 
 
 def _digest(animation: Animation) -> str:
