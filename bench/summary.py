@@ -99,6 +99,12 @@ ROWS = (
         chosen=True,
     ),
     Row("decoding", f"{STREAM}, new arrays", CODED, "test_codec.py::test_decode", chosen=True),
+    Row(
+        "decoding in JavaScript",
+        f"{STREAM}; node.js 20",
+        "{rate:.1f} million symbols/s, {ratio:.2f} times the decoder in Python",
+        "test_codec.py::test_decode_in_javascript",
+    ),
     Row("encoding, ranges fitted", STREAM, CODED, "test_codec.py::test_encode", chosen=True),
     Row(
         "memory to decode an hour of 68 FAPs at 25 Hz at once",

@@ -6,6 +6,7 @@ same way: the ratio is what to quote.
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -143,6 +144,33 @@ def test_decode(
         f"decode {source}: {1e-6 / fast:.1f} million symbols/s; textbook coder {1e-6 / slow:.2f}: "
         f"ratio {slow / fast:.1f}; coder alone {1e-6 / bare:.1f}: ratio {slow / bare:.1f}"
     )
+
+
+def test_decode_in_javascript(
+    benchmark: Any,
+    wide: bytes,
+    head_motion: tuple[Animation, str, str],
+    report: Callable[[str], None],
+    tmp_path: Path,
+) -> None:
+    """The decoder of docs/web.md under node, beside the one in Python on the same stream."""
+    if shutil.which("node") is None:
+        pytest.skip("no node here")
+    animation, bap_steps, source = head_motion
+    file = tmp_path / "wide.fba"
+    file.write_bytes(wide)
+    program = Path(__file__).parents[1] / "tools" / "web" / "measure.mjs"
+
+    def run() -> float:
+        command = ["node", program, file, bap_steps, str(ROUNDS)]
+        return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+    seconds = benchmark.pedantic(run, rounds=1)
+    fba.decode(wide, bap_steps=bap_steps)
+    python = timed(lambda: fba.decode(wide, bap_steps=bap_steps))
+    rate = 1e-6 * 66 * len(animation) / seconds
+    benchmark.extra_info.update(rate=rate, ratio=python / seconds, stream=source)
+    report(f"decode {source} in node: {rate:.1f} million symbols/s, {python / seconds:.2f} times Python's")
 
 
 def test_encode(

@@ -3,11 +3,11 @@
 Each page is followed as a reader would: from its first block to its last, in a fresh folder that holds
 the sample files and nothing else. The language after the three backticks says what a block is:
 
-    sh, python      runs
+    sh, python, js  runs; js where there is node.js
     console         needs a window, a network or the checkout: listed in `ILLUSTRATIONS` with the reason; the
                     `fba` commands in it must be ones that the command line accepts
     text            what the blocks before it print, line by line ("..." stands for lines left out)
-    csv, json, tree data to read
+    csv, json, tree data to read; html: a page to write
 
 A block of no language, or indented instead of fenced, is an error: nothing is left out silently.
 """
@@ -38,8 +38,8 @@ DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", *sorted(DOCS.glob("*.md"))]
 SAMPLES = ROOT / "fba" / "samples"
 
-RUN = {"sh", "python"}
-DATA = {"csv", "json", "tree"}
+RUN = {"sh", "python", "js"}
+DATA = {"csv", "json", "tree", "html"}
 COMMAND = re.compile(r"^\s*(\$ |fba |\./dev|python3? |pip |cd |import |from \w+ import )")
 
 WINDOW = "opens a window, which stays until somebody closes it"
@@ -94,6 +94,10 @@ ILLUSTRATIONS = {
     ("docs/play.md", "nc host 7000 | fba play -"): ARRIVING,
     ("docs/play.md", "apt-get install libegl1 libgl1"): SYSTEM,
     ("docs/virtual-markers.md", "$ fba markers talk.c3d head.obj --points head.points.csv"): WINDOW,
+    (
+        "docs/web.md",
+        'fba conformance --decoder "node player/fba_player/web/conformance.mjs {in} {out} {bap_steps}"',
+    ): "needs node.js and takes a minute; tests/player/web runs the program",
     (
         "docs/play.md",
         "import fba, pyrender",
@@ -198,7 +202,7 @@ def test_every_block_says_what_it_is(page: Path) -> None:
             assert block.key in ILLUSTRATIONS, (
                 f"{block.place}: let it run, or say in ILLUSTRATIONS why not: {block.key}"
             )
-        elif block.language not in RUN:
+        elif block.language not in RUN | {"html"}:
             commands = [line for line in block.code.splitlines() if COMMAND.match(line)]
             assert not commands, f"{block.place}: looks like a command, and does not run: {commands}"
 
@@ -218,14 +222,22 @@ def test_page_runs_from_its_first_block_to_its_last(page: Path, tmp_path: Path, 
     environment = {**os.environ, "PATH": os.pathsep.join(paths)}
     printed: set[str] = set()
     undrawn = False
+    unrun = ""
     for block in blocks(page):
         if block.language == "text":
             shown = {line.strip() for line in block.code.splitlines()} - {"", "..."}
-            assert undrawn or shown <= printed, f"{block.place}: nothing before it prints {shown - printed}"
+            assert undrawn or unrun or shown <= printed, (
+                f"{block.place}: nothing before it prints {shown - printed}"
+            )
         if block.language not in RUN:
+            continue
+        if block.language == "js" and shutil.which("node") is None:
+            unrun = "no node here"
             continue
         if block.language == "python":
             command = [str(programs / "python"), "-c", block.code]
+        elif block.language == "js":
+            command = ["node", "--input-type=module", "-e", block.code]
         else:  # where it leads with `cd`, the next block begins
             command = ["sh", "-e", "-c", f"{block.code}\npwd >{shlex.quote(str(place))}"]
         run = subprocess.run(
@@ -241,6 +253,8 @@ def test_page_runs_from_its_first_block_to_its_last(page: Path, tmp_path: Path, 
             folder = Path(place.read_text().strip())
     if undrawn:
         graphics.skip(graphics.missing_opengl())
+    if unrun:
+        pytest.skip(unrun)
 
 
 def fba_commands(code: str) -> Iterator[list[str]]:

@@ -243,7 +243,8 @@ def test_wheel_holds_every_file_of_the_packages_and_no_other(wheel: Path) -> Non
     assert {f"{package}/py.typed" for package in PACKAGES} <= held
     assert expected - held == set()
     assert {name for name in held if not name.startswith(tuple(f"{p}/" for p in PACKAGES))} == set()
-    assert {name for name in held if "__pycache__" in name} == set()
+    assert "fba_player/web/dist/fba.min.js" in held
+    assert {name for name in held if {"__pycache__", "node_modules"} & set(name.split("/"))} == set()
 
 
 INSTALLED = """

@@ -32,18 +32,18 @@ def make_tables() -> str:
     )
     return "\n".join(
         [
-            "/** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py: a digit in base 36 for each parameter. */",
+            "/** Tables of ISO/IEC 14496-2, from tools/web/make_tables.py: digits in base 36. */",
             "",
             "/** Groups of FAPs 1 to 68 and of BAPs 1 to 296, from 0. */",
             f"export const FAP_GROUPS = {_groups(fap_groups())};",
             f"export const BAP_GROUPS = {_groups(bap_groups())};",
-            "/** Quantiser steps, as places in this list, of FAPs 3 to 68 and of BAPs 1 to 186; 1 for later ones. */",
+            "/** Quantiser steps of FAPs 3 to 68 and BAPs 1 to 186, as places in this list; else 1. */",
             f"export const STEPS = {steps};",
             f"export const FAP_STEPS = {_digits(map(steps.index, faps.tolist()))};",
             f"export const BAP_STEPS = {{\n{bap_tables},\n}};",
-            "/** Default limits, in units of 60, of FAPs 3 to 68, up and down, in I planes and in P planes. */",
+            "/** Default limits of FAPs 3 to 68, up and down, in units of 60: in I planes, in P planes. */",
             f"export const FAP_LIMITS = [{_digits(limits[0, FAPS])}, {_digits(limits[2, FAPS])}];",
-            "/** Those of BAPs 1 to 186: in I planes up, in I planes down, in P planes up and down; as magnitudes. */",
+            "/** Those of BAPs 1 to 186, as magnitudes: in I planes up and down, in P planes both. */",
             f"export const BAP_LIMITS = [{', '.join(map(_digits, (i_max, i_min, p_max)))}];",
             "",
         ]

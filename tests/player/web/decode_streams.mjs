@@ -1,8 +1,11 @@
-/** Print what the decoder finds in each stream of a file, a line of JSON each: node decode_streams.mjs FILE LONGEST_BYTEWISE. */
+/**
+ * Print what the decoder finds in each stream of a file, a line of JSON each:
+ * node decode_streams.mjs FILE LONGEST_BYTEWISE [MODULE].
+ */
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
-import { Decoder, FbaError, decode } from "../../../player/fba_player/web/fba.js";
 
+const { Decoder, FbaError, decode } = await import(process.argv[4] ?? "../../../player/fba_player/web/fba.js");
 const all = readFileSync(process.argv[2]);
 for (let at = 0; at < all.length; ) {
   const size = all.readUInt32BE(at);
@@ -22,12 +25,12 @@ function outcome(stream, salvage) {
       values: digest(frames),
       mark: animation.mark,
       damage: animation.damage.map(({ error, start, stop, framesLost, uncertainty, doubtful }) => [
-        start, stop, framesLost, uncertainty, doubtful, error.plane ?? null, error.bit ?? null, error.finding,
+        start, stop, framesLost, uncertainty, doubtful, place(error),
       ]),
     };
   } catch (error) {
     if (!(error instanceof FbaError)) throw error;
-    return { error: error.finding, plane: error.plane ?? null, bit: error.bit ?? null };
+    return { error: place(error) };
   }
 }
 
@@ -41,9 +44,13 @@ function bytewise(stream) {
     frames.push(...decoder.finish());
   } catch (error) {
     if (!(error instanceof FbaError)) throw error;
-    return { frames: frames.length, values: digest(frames), error: error.finding };
+    return { frames: frames.length, values: digest(frames), error: place(error) };
   }
   return { frames: frames.length, values: digest(frames), error: null };
+}
+
+function place({ plane, bit, finding }) {
+  return finding ? [plane ?? null, bit ?? null] : "no finding";
 }
 
 function digest(frames) {

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
 import json
-import re
 import shutil
 import struct
 import subprocess
@@ -19,9 +19,10 @@ import fba
 from fba.animation import Animation
 from fba.codec import Decoder, decode
 from fba.codec._decoder import read_blocks, reader_for
-from fba.errors import BitstreamError, FbaError
+from fba.errors import FbaError
 from fba.limits import DEFAULT_LIMITS
-from fba_conformance.suite.index import read_vectors
+from fba_conformance.suite.index import SHIPPED_VECTORS, read_vectors
+from fba_conformance.suite.programs import check_decoder, parse_program
 from tools.fuzz._engine import mutated
 from tools.fuzz.corpus import read_corpus
 from tools.fuzz.targets import find_target
@@ -29,6 +30,7 @@ from tools.web import make_tables
 
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
 MUTANTS = 150
+WEB = Path(__file__).parents[3] / "player" / "fba_player" / "web"
 LONGEST_BYTEWISE = 120
 """Bytes of a stream that is also pushed byte by byte: longer ones take their time in Python."""
 pytestmark = pytest.mark.filterwarnings("ignore::fba.FbaWarning")
@@ -50,20 +52,89 @@ def test_damaged_streams(tmp_path: Path) -> None:
     _compare([mutated(target, corpus, 27, number)[0] for number in range(MUTANTS)], tmp_path)
 
 
+@needs_node
+def test_the_bundle_does_what_the_sources_do(tmp_path: Path) -> None:
+    streams = [vector.data() for vector in read_vectors()]
+    bundle = tmp_path / "fba.mjs"  # the name by which node takes it for a module
+    shutil.copy(WEB / "dist" / "fba.min.js", bundle)
+    assert _found(streams, tmp_path, str(bundle)) == _found(streams, tmp_path)
+
+
+@needs_node
+def test_size() -> None:
+    """What docs/web.md says of it, in kB."""
+    assert len(gzip.compress((WEB / "dist" / "fba.min.js").read_bytes(), 9)) < 11_000
+
+
+@needs_node
+def test_mutants() -> None:
+    """Frames or an FbaError, nothing else, in time that the size of the stream bounds."""
+    program = Path(make_tables.__file__).with_name("mutants.mjs")
+    done = subprocess.run(["node", program, "300", "1"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "300 mutants, 0 failures\n")
+
+
+MESSAGES = {
+    "dct_face": "plane 5, bit 532 (byte 66): FAPs are coded as DCT segments, whose tables are in no public "
+    "source",
+    "text": "plane 0, bit 0 (byte 0): no object start code 00 00 01 ba: the stream begins with 23 46 42 41",
+    "marker_range": "plane 5, bit 668 (byte 83): marker bit in the p_min range list is 0, expected 1",
+    "mask_0_intra": "plane 5, bit 441 (byte 55): fba_object_mask is 0, expected 1 to 3",
+    "viseme_above": "plane 3, bit 296 (byte 37): FAP 1 (viseme) gets a value outside 0..14; "
+    "the stream is damaged here or before",
+    "cut_masks": "plane 5, bit 512 (byte 64): the stream ends inside this plane",
+}
+REMEDY = "; the option salvage reads on behind it"
+
+
+@needs_node
+def test_messages_say_where_and_what_and_what_helps() -> None:
+    code = """
+        import { readFileSync } from "node:fs";
+        const [module, ...files] = process.argv.slice(1);
+        const { decode } = await import(module);
+        function show(data, options) {
+            try { decode(data, options); } catch (error) { console.log(error.message); }
+        }
+        for (const file of files) show(readFileSync(file));
+        show(readFileSync(files[0]), { bapSteps: "ISO" });
+        show("text");
+    """
+    files = [str(SHIPPED_VECTORS / "damaged" / f"{name}.fba") for name in MESSAGES]
+    command = ["node", "--input-type=module", "-e", code, (WEB / "fba.js").as_uri(), *files]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    expected = [text if name == "dct_face" else text + REMEDY for name, text in MESSAGES.items()]
+    expected += ['bapSteps is "ISO", expected "iso" or "visage"', "expected a Uint8Array or an ArrayBuffer"]
+    assert done.stdout.splitlines() == expected
+
+
+@needs_node
+def test_conformance() -> None:
+    """The program for `fba conformance --decoder`, with tables of steps, and with damage."""
+    program = parse_program(f"node '{WEB / 'conformance.mjs'}' {{in}} {{out}} {{bap_steps}}", seconds=120)
+    for vector in read_vectors():
+        if vector.name in {"valid/body_visage.fba", "valid/marked_steps.fba", "damaged/two_damages.fba"}:
+            result = check_decoder(program, vector)
+            assert result.passed, result
+            assert not result.skipped
+
+
 def _compare(streams: Sequence[bytes], folder: Path) -> None:
     """Decode streams whole, salvaging and byte by byte, with both decoders; fail where they differ."""
-    file = folder / "streams"
-    file.write_bytes(b"".join(struct.pack(">I", len(stream)) + stream for stream in streams))
-    program = str(Path(__file__).with_name("decode_streams.mjs"))
-    done = subprocess.run(
-        ["node", program, file, str(LONGEST_BYTEWISE)], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    for number, (stream, line) in enumerate(zip(streams, done.stdout.splitlines(), strict=True)):
-        found = json.loads(line)
+    for number, (stream, found) in enumerate(zip(streams, _found(streams, folder), strict=True)):
         for name, salvage in (("strict", False), ("salvaged", True)):
             assert found[name] == _outcome(stream, salvage), f"stream {number}, {name}"
         assert found["bytewise"] == _bytewise(stream), f"stream {number}, byte by byte"
+
+
+def _found(streams: Sequence[bytes], folder: Path, *module: str) -> list[dict[str, Any]]:
+    file = folder / "streams"
+    file.write_bytes(b"".join(struct.pack(">I", len(stream)) + stream for stream in streams))
+    program = str(Path(__file__).with_name("decode_streams.mjs"))
+    command = ["node", program, file, str(LONGEST_BYTEWISE), *module]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
 
 
 def _outcome(stream: bytes, salvage: bool) -> dict[str, Any]:
@@ -71,7 +142,7 @@ def _outcome(stream: bytes, salvage: bool) -> dict[str, Any]:
     try:
         animation = decode(stream, on_error=on_error)
     except FbaError as error:
-        return _error(error)
+        return {"error": _place(error)}
     reader = reader_for(memoryview(stream), bap_steps=None, on_error=on_error, limits=DEFAULT_LIMITS)
     reader.times.may_step_back = True
     for _ in read_blocks(reader, memoryview(stream)):
@@ -84,8 +155,7 @@ def _outcome(stream: bytes, salvage: bool) -> dict[str, Any]:
         "damage": [
             [
                 one.start, one.stop, one.frames_lost, one.uncertainty,
-                [one.doubtful.start, one.doubtful.stop] if one.doubtful else None,
-                *[_error(one.error)[key] for key in ("plane", "bit", "error")],
+                [one.doubtful.start, one.doubtful.stop] if one.doubtful else None, _place(one.error),
             ]
             for one in reader.damage
         ],
@@ -104,16 +174,13 @@ def _bytewise(stream: bytes) -> dict[str, Any] | None:
         frames += decoder.finish()
     except FbaError as raised:
         frames += [frame for block in getattr(raised, "blocks", ()) for frame in block.frames()]
-        error = _error(raised)["error"]
+        error = _place(raised)
     rows = b"".join(_rows(frame).tobytes() for frame in frames)
     return {"frames": len(frames), "values": sha256(rows).hexdigest(), "error": error}
 
 
-def _error(error: Exception) -> dict[str, Any]:
-    text = error.message if isinstance(error, BitstreamError) else str(error).split(": ", 1)[-1]
-    text = text.partition("; it seems")[0]  # kinds of other files and names of parameters: Python's alone
-    text = re.sub(r"^(FAP|BAP) (\d+) (?!viseme_|expression_)\w+ (is sent|gets)", r"\1 \2 \3", text)
-    return {"error": text, "plane": getattr(error, "plane", None), "bit": getattr(error, "bit", None)}
+def _place(error: Exception) -> list[int | None]:
+    return [getattr(error, "plane", None), getattr(error, "bit", None)]
 
 
 def _digest(animation: Animation) -> str:

@@ -26,7 +26,7 @@ export class Animation {
     /** What was lost, when salvaging. */
     this.damage = decoder.damage;
     if (!planes.length) {
-      throw new FbaError("damage", "the stream holds no plane that can be decoded", 0, undefined, this.damage[0]?.error.message);
+      throw new FbaError("damage", "the stream holds no plane that can be decoded", 0, undefined, this.damage[0]?.error.message ?? "");
     }
     /** What is odd in the stream. */
     this.warnings = decoder.warnings;

@@ -9,7 +9,7 @@ export class FbaError extends Error {
    * @param {number} [bit] from the start of the stream
    * @param {string} [remedy]
    */
-  constructor(kind, finding, plane, bit, remedy = "") {
+  constructor(kind, finding, plane, bit, remedy = kind === "damage" ? "the option salvage reads on behind it" : "") {
     const where = [];
     if (plane !== undefined) where.push(`plane ${plane}`);
     if (bit !== undefined) where.push(`bit ${bit} (byte ${Math.floor(bit / 8)})`);

@@ -63,7 +63,7 @@ export const HIGHEST = Int32Array.from({ length: SLOTS }, (_, slot) => (slot >= 
 
 /** Default ranges as magnitudes, of all slots I max, I min, P max, P min; NaN for extension BAPs, which have none. */
 export const DEFAULT_LIMITS = [0, 1, 2, 3].map((list) =>
-  Float64Array.from({ length: SLOTS }, (_, slot) => {
+  Float32Array.from({ length: SLOTS }, (_, slot) => {
     const [table, first] = slot < FLAGS ? [FAP_LIMITS[list >> 1], FIRST_FAP] : [BAP_LIMITS[Math.min(list, 2)], FIRST_BAP];
     return RANGE_UNIT * parseInt(table[slot - first] ?? "", 36);
   }),

@@ -43,7 +43,8 @@ export class PlaneReader {
     this._flags = new Int32Array(FLAG_COUNT);
     /** Of the object's BAP steps. @type {import("./parameters.js").BapSteps} */
     this._table = "iso";
-    this._limits = DEFAULT_LIMITS.map((list) => list.slice());
+    /** Ranges of the slots: I max, I min, P max, P min. @type {Float32Array[]} */
+    this._limits = [];
     /** Of the face at FACE, of the body at BODY. @type {(Part | undefined)[]} */
     this._settings = [];
     this._doubtfulRanges = 0; // parts whose ranges may have been replaced in a lost plane
@@ -165,22 +166,22 @@ export class PlaneReader {
     if (!settings || !same(mask, settings.mask) || !same(interpolated, settings.interpolated)) {
       settings = { mask, interpolated, ...layout(part, columns.filter((column) => mask[column])) };
     }
-    const lacking = settings.slots.filter((slot) => this._limits.some((list) => slot >= FIRST_BAP && Number.isNaN(list[slot])));
-    if (lacking.length) {
-      throw new Fault(`${label(Math.min(...lacking))} is sent, but no range for it, and it has no default`, bits._bit);
-    }
     const scale = scaleOf(part, quant);
+    const level = (/** @type {number} */ list, /** @type {number} */ slot) => Math.floor(this._limits[list][slot] / scale);
+    let lacking = SLOTS; // first slot without a range
     for (const slot of settings.slots) {
-      let [iMax, iMin, pMax, pMin] = this._limits.map((list) => Math.floor(list[slot] / scale));
-      if (slot < FIRST_FAP) {
-        iMax = pMax = pMin = amountLimit(slot, quant);
-        iMin = 0;
-      }
+      const amount = slot < FIRST_FAP ? amountLimit(slot, quant) : null;
+      const iMin = amount === null ? level(1, slot) : 0;
+      const pMin = amount ?? level(3, slot);
+      const intraSize = (amount ?? level(0, slot)) + iMin + 1;
+      const size = (amount ?? level(2, slot)) + pMin + 1;
+      if (Number.isNaN(intraSize + size)) lacking = Math.min(lacking, slot);
+      else (this._models[slot] ??= new Model())._begin(intraSize, size, pMin);
       this._minimum[0][slot] = -pMin;
       this._minimum[1][slot] = -iMin;
       this._step[slot] = stepOf(slot, quant, this._table);
-      (this._models[slot] ??= new Model())._begin(iMax + iMin + 1, pMax + pMin + 1, pMin);
     }
+    if (lacking < SLOTS) throw new Fault(`${label(lacking)} is sent, but no range for it, and it has no default`, bits._bit);
     return settings;
   }
 }

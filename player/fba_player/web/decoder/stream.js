@@ -152,8 +152,8 @@ export class Decoder {
           : memory + DAMAGE_BYTES * this.damage.length > most + GROWTH * this._offset ? [most, "mostBytes"]
           : [0, ""];
         if (name) {
-          const remedy = `raise ${name} if the stream is to be trusted`;
-          throw new FbaError("limit", `the stream exceeds a limit, ${limit}`, undefined, undefined, remedy);
+          const remedy = "raise it if the stream is to be trusted";
+          throw new FbaError("limit", `the stream exceeds ${name}, ${limit}`, undefined, undefined, remedy);
         }
       } catch (error) {
         if (!(error instanceof FbaError)) throw error;

@@ -1,16 +1,16 @@
-/** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py: a digit in base 36 for each parameter. */
+/** Tables of ISO/IEC 14496-2, from tools/web/make_tables.py: digits in base 36. */
 
 /** Groups of FAPs 1 to 68 and of BAPs 1 to 296, from 0. */
 export const FAP_GROUPS = "00111111111111111122222222222233333333444455555666777777777788889999";
 export const BAP_GROUPS = "00012123412341234343434787878785656565678567878999dddaaabbb999cccbbbcccaaacccdddbbbddd999cccbbbdddaaacccbbbaaaccc999bbbaaaghefghghefefghefghghefefghefghghefefghefghghefefefefghefefiiiiiijjjjjjjjjjjjjjjjjjjjjjkkkkkkkkkkkkkkkkkkkkkkllllllllllllllllllllllmmmmmmmmmmmmmmmmmmmmmmnnnnnnnnnnnnnnnnnnnnnn";
-/** Quantiser steps, as places in this list, of FAPs 3 to 68 and of BAPs 1 to 186; 1 for later ones. */
+/** Quantiser steps of FAPs 3 to 68 and BAPs 1 to 186, as places in this list; else 1. */
 export const STEPS = [1, 2, 4, 64, 128, 170, 256, 512];
 export const FAP_STEPS = "211111111110000000004444000011111100111100007555111111111100000000";
 export const BAP_STEPS = {
   iso: "333444466446644666666664444444433336633664444664446664446664446666666664446666666666664446666666664446666664446664446664447744446644446644446644446644446644446644446644444444664444333333",
   visage: "555555566556655666666665555555555556655665555665556665556665556666666665556666666666665556666666665556666665556665556665557755556655556655556655556655556655556655556655555555665555111555",
 };
-/** Default limits, in units of 60, of FAPs 3 to 68, up and down, in I planes and in P planes. */
+/** Default limits of FAPs 3 to 68, up and down, in units of 60: in I planes, in P planes. */
 export const FAP_LIMITS = ["iavaaaavvaaaiii7iiaakkffaa77ffffffffffaaiiiiivvvavaaaavvaa99cfffff", "63a3333aa3336663aa447755332266666655553377777aaa3a3333aa3322334455"];
-/** Those of BAPs 1 to 186: in I planes up, in I planes down, in P planes up and down; as magnitudes. */
+/** Those of BAPs 1 to 186, as magnitudes: in I planes up and down, in P planes both. */
 export const BAP_LIMITS = ["gggll88gg33ggddggdd33dd41226166vvv4ggqqggggbbbbvvv444bbb444bbb444444444bbb444444444444bbb444444444bbb444444bbb444bbb444bbb444427631111336624441111226633331111116642341111g8i2221111vvvvvv", "gggllggggppggddggdd33dd14221666ii4vgg11ggggbbbbvvv444bbb444bbb444444444bbb444444444444bbb444444444bbb444444bbb444bbb444bbb44jj7236nngg33jj4244nngg22jj3333nngg11jj2443nngg8g2iccddggvvvvvv", "aaaaaaa66aa66aa66aa22aa22112222aaaa66aa66aa6666aaa2226662226662222222226662222222222226662222222226662222226662226662226662244222244442244222244442244222244441144112244444444444444aaaaaa"];
