@@ -85,6 +85,7 @@ fba.formats.gltf
 fba.formats.face_tables
 fba.live._protocols
 fba.live
+fba.serving
 fba.persona.points
 fba.persona.recognition
 fba.persona
@@ -112,6 +113,7 @@ fba.cli.recordings
 fba.cli.coding
 fba.cli.subcommands
 fba.cli.commands
+fba.cli.commands.live
 fba.__main__
 """
 FLOORS = _FLOORS.split()

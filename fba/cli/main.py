@@ -28,6 +28,7 @@ _COMMANDS = {
     "convert": "Convert a file into another format.",
     "play": "Play a file in a window.",
     "export": "Make a page that plays files in any browser, without a network.",
+    "serve": "Show files, or a stream while it arrives, in browsers.",
     "render": "Render a file to a picture or a video, without a window.",
     "verify": "Check FBA streams for damage, and compute digests of their values.",
     "stats": "Show where the bits of FBA streams go.",
@@ -42,6 +43,8 @@ _COMMANDS = {
     "persona": "Learn how an actor moves the face, and play another person's performance so.",
     "demo": "Encode the sample animation, print its size, and play it.",
 }
+_LIVE = ("capture", "send", "serve")
+"""Subcommands in the folder `live`."""
 
 BAD_DATA, BAD_USAGE = 1, 2
 """Exit codes."""
@@ -109,7 +112,8 @@ class _Commands(Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
-        command: click.Command = import_module(f"fba.cli.commands.{cmd_name}").command
+        folder = "live." if cmd_name in _LIVE else ""
+        command: click.Command = import_module(f"fba.cli.commands.{folder}{cmd_name}").command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -201,9 +201,10 @@ class Encoder:
         """End the stream; return the last bytes: alignment, end code, mark. ValueError without a frame."""
         if self._finished:
             return b""
-        if self._pending is None:
+        if self._pending is not None:
+            self._encode(self._pending, int(self._pending.index[0]) + 1)
+        elif not self._writer.planes:
             raise ValueError("there is no frame to encode")
-        self._encode(self._pending, int(self._pending.index[0]) + 1)
         self._finished = True
         writer = self._writer
         writer.end_object()

@@ -117,6 +117,7 @@ class StreamRecorder:
         bit_rate: float | None = None,
         buffer: float = 1.0,
         compact: bool = False,
+        prompt: bool = False,
     ) -> None:
         if compact and bit_rate is not None:
             raise OptionError("compact and bit_rate contradict each other: the bit rate decides what is sent")
@@ -131,6 +132,7 @@ class StreamRecorder:
             self.encoder = rated or Encoder(self.options)
             self.encoder.expect(widest_faces())
         self.targets = tuple(targets)
+        self._prompt = prompt
 
     def push(self, animation: Animation) -> None:
         """Add frames. Raises FormatError where a target cannot be written."""
@@ -139,7 +141,10 @@ class StreamRecorder:
                 target.begin(write_opening(self.options.bap_steps))
         self.frames += len(animation)
         self.rate = animation.rate
-        self._write(self.encoder.push_animation(animation), self.encoder.ending())
+        data = self.encoder.push_animation(animation)
+        if self._prompt and isinstance(self.encoder, Encoder):
+            data += self.encoder.settle(int(animation.index[-1]) + 1)
+        self._write(data, self.encoder.ending())
 
     def finish(self) -> None:
         """End the stream, if it has any frame, and close the targets."""

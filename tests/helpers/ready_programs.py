@@ -87,10 +87,12 @@ def ready_programs() -> Iterator[Path]:
 
 def prepare() -> None:
     """Import all that the command line may need, and run a little of it."""
-    from fba.cli.main import _COMMANDS
+    import click
+
+    from fba.cli.main import _COMMANDS, group
 
     for name in _COMMANDS:
-        import_module(f"fba.cli.commands.{name}")
+        group.get_command(click.Context(group), name)
     import numpy as np
 
     import fba

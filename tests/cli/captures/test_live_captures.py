@@ -203,7 +203,7 @@ def test_a_telephone_is_asked(run: Callable[..., Any], tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (["livelink"], 2, "give -o OUT.fba to record, --play to see it, or both"),
+        (["livelink"], 2, "give -o OUT.fba to record, --play or --serve PORT to see it, or several"),
         (["livelink", "-o", "a.fba", "--model", "."], 2, "--model goes with --play"),
         (["livelink", "-o", "a.fba", "--ask", "10.0.0.2"], 2, "Live Link Face sends by itself"),
         (["vtube", "-o", "a.fba", "--ask", "10.0.0.2:x", "--seconds", "0.1"], 1, "'x' is not a port"),

@@ -196,7 +196,7 @@ fba.live.recording.warm_up = warmed
 @pytest.mark.parametrize(
     ("module", "place"),
     [
-        pytest.param("fba.cli.commands.capture", "", id="imports"),
+        pytest.param("fba.cli.commands.live.capture", "", id="imports"),
         pytest.param("fba.live.recording", "", id="later imports"),
         pytest.param("", COMPILES, id="compiling"),
         pytest.param("", LOADS, id="loading machine code"),

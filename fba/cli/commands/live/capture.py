@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import queue
-import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -20,16 +18,18 @@ from fba.cli.coding import rate_options
 from fba.cli.coding.clamped_values import clamped_lines
 from fba.cli.command import Command, examples
 from fba.cli.inputs import read_model
-from fba.cli.interruptions import raise_delayed
+from fba.cli.interruptions import raise_delayed, stopping
 from fba.cli.option_fields import option, option_like, with_options
 from fba.cli.outputs import STANDARD, Output, Outputs, display_name, output_option
 from fba.cli.printing import rate_text, seconds_text
+from fba.cli.web_server import HOST_HELP, INTRA_PERIOD, StreamTarget, open_server
 from fba.encoder_options import QUANT_MAX, EncoderOptions
 from fba.errors import FbaError
 
 if TYPE_CHECKING:
-    from fba.live import Capture, Receiver, StreamRecorder, Summary
+    from fba.live import Capture, Kind, Receiver, StreamRecorder, Summary
     from fba.live.recording import Target
+    from fba.serving import Server
     from fba.tracks import BodyTrack, FaceTrack
 
 KINDS = ("livelink", "ifacialmocap", "vtube", "vmc")
@@ -76,16 +76,23 @@ class _Coding:
         """Whether FAPs that players derive are left out."""
         return self.preset == "compact"
 
-    def recorder(self, targets: list[Target]) -> StreamRecorder:
-        """Return the encoder that writes frames to the targets."""
+    def recorder(self, targets: list[Target], *, served: bool) -> StreamRecorder:
+        """Return the encoder that writes frames to the targets. served: whether viewers come and go."""
         from fba.live import StreamRecorder
 
         return StreamRecorder(
             targets,
-            EncoderOptions(fap_quant=self.fap_quant, clamp=True, bap_steps="visage"),
+            EncoderOptions(
+                fap_quant=self.fap_quant,
+                clamp=True,
+                bap_steps="visage",
+                start_codes=served,
+                intra_period=INTRA_PERIOD if served else None,
+            ),
             bit_rate=self.bit_rate,
             buffer=self.buffer,
             compact=self.is_compact,
+            prompt=served,
         )
 
 
@@ -97,6 +104,11 @@ class _Request:
     output: Path | None = output_option("OUT.fba", "Stream to write while it comes; - for standard output.")
     no_clobber: bool = options.no_clobber_option
     play: bool = option(default=False, help="Show it in a window.")
+    serve: int | None = option(
+        type=click.IntRange(0, 65_535), metavar="PORT",
+        help="Show it in browsers, on this TCP port; 0: any that is free. See `fba serve`.",
+    )  # fmt: skip
+    serve_host: str | None = option(metavar="ADDRESS", help=f"With --serve: {HOST_HELP}")
     network: _Network
     seconds: Fraction | None = option(
         type=options.PERIOD, metavar="SECONDS", help="Stop after that; default: on Ctrl-C."
@@ -128,6 +140,7 @@ class _Request:
         "fba capture ifacialmocap --ask 192.168.0.20 -o face.fba --seconds 60",
         "fba capture vtube --ask 192.168.0.20 --play",
         "fba capture vmc -o person.fba",
+        "fba capture livelink --serve 8080",
     ),
 )
 @click.argument("kind", type=click.Choice(KINDS), metavar=f"[{'|'.join(KINDS)}]")
@@ -147,7 +160,7 @@ def command(request: _Request) -> None:
         from fba import player
 
         player.check_display()  # before work that takes long
-    from fba.live import Capture, Receiver, find_kind
+    from fba.live import find_kind
     from fba.live.recording import warm_up
 
     kind = find_kind(request.kind)
@@ -156,7 +169,27 @@ def command(request: _Request) -> None:
     warm_up(bodies=kind.bodies, rated=coding.bit_rate is not None, compact=coding.is_compact)
     raise_delayed()  # from here on, Ctrl-C ends the capture and not the command
     targets, stream = _targets(output, play=request.play)
-    recorder = coding.recorder(targets)
+    with _server(request, kind.description) as server:
+        if server is not None:
+            targets.append(StreamTarget(server.stage(0)))
+        _capture(request, kind, outputs, targets, stream)
+
+
+def _server(request: _Request, title: str) -> AbstractContextManager[Server | None]:
+    """Return the server of `--serve`, or nothing."""
+    if request.serve is None:
+        return nullcontext()
+    return open_server([title], host=request.serve_host, port=request.serve)
+
+
+def _capture(
+    request: _Request, kind: Kind, outputs: Outputs, targets: list[Target], stream: StreamQueue | None
+) -> None:
+    """Capture to targets, one of which may be that of a window; print what was received."""
+    from fba.live import Capture, Receiver
+
+    network = request.network
+    recorder = request.coding.recorder(targets, served=request.serve is not None)
     capture = Capture(
         kind, recorder.push, sender=network.sender, rate=request.rate, swap=request.swap,
         neutral=request.neutral, say=lambda text: click.echo(f"fba: {text}", err=True),
@@ -166,7 +199,7 @@ def command(request: _Request) -> None:
         limit = None if request.seconds is None else float(request.seconds)
         try:
             if stream is None:
-                with _stopping(receiver.stop):
+                with stopping(receiver.stop):
                     receiver.run(limit)
             else:
                 _play(stream, receiver, capture, recorder, limit, request.model)
@@ -175,14 +208,21 @@ def command(request: _Request) -> None:
             recorder.finish()
     if not summary.frames:
         raise FbaError(_nothing(summary, capture, receiver))
-    _report(outputs, output, recorder, summary, as_json=request.as_json)
+    _report(outputs, request.output, recorder, summary, as_json=request.as_json)
 
 
 def _check(request: _Request) -> None:
     """Raise click.UsageError for options that contradict each other."""
     coding = request.coding
-    if request.output is None and not request.play:
-        raise click.UsageError("give -o OUT.fba to record, --play to see it, or both")
+    if request.output is None and not request.play and request.serve is None:
+        raise click.UsageError("give -o OUT.fba to record, --play or --serve PORT to see it, or several")
+    if request.serve_host is not None and request.serve is None:
+        raise click.UsageError("--serve-host goes with --serve")
+    if request.serve is not None and coding.bit_rate is not None:
+        raise click.UsageError(
+            "--serve and --bitrate contradict each other: viewers who come late need I planes, for which a "
+            "bit rate leaves no room"
+        )
     if request.model is not None and not request.play:
         raise click.UsageError("--model goes with --play")
     rate_options.check_buffer()
@@ -231,31 +271,6 @@ def _targets(output: Path | None, *, play: bool) -> tuple[list[Target], StreamQu
         targets.append(StreamPipe(sys.stdout.buffer) if output == STANDARD else StreamFile(output))
     stream = StreamQueue() if play else None
     return [*targets, *([] if stream is None else [stream])], stream
-
-
-@contextmanager
-def _stopping(stop: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C, `kill` and a closed terminal stop the capture; a second one interrupts as usual."""
-    before: dict[int, Any] = {}
-
-    def handle(number: int, _frame: object) -> None:
-        signal.signal(number, before[number])
-        stop()
-
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        if (
-            number is not None
-            and threading.current_thread() is threading.main_thread()
-            and signal.getsignal(number) is not signal.SIG_IGN
-        ):
-            before[number] = signal.getsignal(number)
-            signal.signal(number, handle)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _play(

@@ -1,0 +1,1 @@
+"""Subcommands that send and receive while it happens: capture, send, serve."""

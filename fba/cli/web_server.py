@@ -1,0 +1,68 @@
+"""The server of `fba serve` and `fba capture --serve`: its options, its page, and captures as its streams."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from fba.serving import Server, Stage
+
+HOST_HELP = (
+    "Own address to listen on, 0.0.0.0 for all; viewers then need the address with a random token that is "
+    "printed. Default: only this computer can watch."
+)
+INTRA_PERIOD = 2
+"""Seconds from one I plane, at which viewers who lost frames go on, to the next, in streams made here."""
+
+
+def make_page(titles: Sequence[str]) -> bytes:
+    """Return the page that shows streams with these titles."""
+    streams = "".join(f"<li><code>stream?n={n}</code> {html.escape(title)}" for n, title in enumerate(titles))
+    text = f"<p>Streams, each a WebSocket:<ul>{streams}</ul>"
+    return f"<!doctype html><meta charset=utf-8><title>fba</title>{text}".encode("utf-8", "replace")
+
+
+@contextmanager
+def open_server(
+    titles: Sequence[str], *, host: str | None, port: int, most_viewers: int | None = None
+) -> Iterator[Server]:
+    """Serve streams; print the address of their page. most_viewers: at once, by default `MOST_VIEWERS`."""
+    from fba.serving import MOST_VIEWERS, Server
+
+    server = Server(
+        make_page(titles), titles, host=host, port=port, most_viewers=most_viewers or MOST_VIEWERS
+    )
+    with server:
+        click.echo(f"fba: open {server.url}", err=True)
+        yield server
+
+
+class StreamTarget:
+    """A target of a `fba.live.StreamRecorder` that shows its stream to viewers."""
+
+    def __init__(self, stage: Stage) -> None:
+        from fba.serving import PlaneSplitter
+
+        self._stage = stage
+        self._splitter = PlaneSplitter()
+
+    def begin(self, opening: bytes) -> None:
+        """Begin the stream with the bytes before it."""
+        self.write(opening, b"")
+
+    def write(self, data: bytes, ending: bytes) -> None:
+        """Add bytes."""
+        for plane in self._splitter.push(data) if data else ():
+            self._stage.publish(plane)
+
+    def close(self) -> None:
+        """End the stream."""
+        if self._splitter.planes:
+            for plane in self._splitter.finish():
+                self._stage.publish(plane)
+            self._stage.end(self._splitter.ending)
