@@ -55,7 +55,7 @@ def make_figure_tables() -> str:
     columns = ",\n  ".join(str(column.tolist()) for column in donors())
     return (
         "/** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py. */\n"
-        "/** Columns of the FAPs that each unsent FAP copies: its mate, its lip mate, and the mate of that. */\n"
+        "/** Columns of the FAPs that each FAP copies: its mate, its lip mate, and the mate of that. */\n"
         f"export const DONORS = [\n  {columns},\n];\n"
     )
 

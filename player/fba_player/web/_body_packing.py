@@ -15,10 +15,12 @@ from fba.body.solve import _pose_loops as pose_loops
 from fba.body.solve.conventions import convention
 from fba_player._figure.person import Person, head_middle
 from fba_player.web._container import Container, rounded
-from fba_player.web._face_packing import STEP, Chosen, reduce_parts
+from fba_player.web._face_packing import STEP, Chosen, fewer_triangles, reduce_parts
 
 WEIGHT_STEP = 1 / 16384
 """Weights and shares of twists are multiples of it."""
+NORMAL_STEP = 1 / 63
+"""Coordinates of normals are multiples of it: half a degree."""
 
 
 def pack_body_parts(
@@ -33,8 +35,7 @@ def pack_body_parts(
     for part in body.parts:
         shape = person.body_shapes.get(part.name)
         if shape is not None and len(shape.triangles):
-            fewer = shape.coarser and shape.coarser.triangles_within(detail)
-            chosen.append((part, shape.triangles if fewer is None else fewer, body.starts[part.name], shape))
+            chosen.append((part, fewer_triangles(shape, detail), body.starts[part.name], shape))
     reduced = reduce_parts(container, chosen)
     skull = skull_of(body)
     skeleton, default = body.skeleton, Skeleton.default()
@@ -48,6 +49,7 @@ def pack_body_parts(
     header = {
         "parts": reduced.header,
         "positions": container.add_fractions(body.vertices[reduced.rows], STEP, centred=True),
+        "normals": container.add_fractions(body.normals[reduced.rows], NORMAL_STEP),
         "skeleton": _pack_skeleton(skeleton),
         "standard": _pack_skeleton(default) if grounded else None,
         "soles": [_soles(default), _soles(skeleton)] if grounded else [],

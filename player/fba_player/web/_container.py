@@ -1,9 +1,9 @@
 """A file of named numbers and arrays that the web player reads: `figure/container.js`.
 
-"FBAW", the length of the header (uint32, little-endian, here and below), the header: JSON in UTF-8, then the
+"FBAW", the length of the header (uint32, little-endian as all numbers), the header: JSON in UTF-8, then the
 bytes of the arrays. `arrays` in the header lists them; other members name one by its place in that list. An
-array: [type, rows, columns, first byte after the header, coding]. Types: u1, i1, u2, i2, u4, i4. Codings, which
-make gzip's work easier, store the bytes of one column after the other, of each first the lowest bytes of all
+array: [type, rows, columns, first byte after the header, coding]. Types: u1, i1, u2, i2, u4, i4. Codings,
+which make gzip's work easier, store the bytes of one column after the other, of each first the lowest bytes of all
 rows, then the next:
 
 - "delta": of the difference from the row above, modulo the type, as 2 d for d >= 0 and -2 d - 1 below.
@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Array, Float64, Int64
+from fba.errors import ModelError
 
 MAGIC = b"FBAW"
 TYPES = ("u1", "i1", "u2", "i2", "u4", "i4")
@@ -37,13 +38,16 @@ class Container:
         self._bytes = bytearray()
 
     def add_integers(self, values: npt.ArrayLike) -> int:
-        """Add whole numbers (N,) or (N, K) of up to 32 bits; return their place."""
+        """Add whole numbers (N,) or (N, K); return their place. ModelError where they do not fit 32 bits."""
         array = np.asarray(values, dtype=np.int64)
         rows = array[:, None] if array.ndim == 1 else array
-        kind = next(
-            name for name in TYPES
-            if not rows.size or (np.iinfo(name).min <= rows.min() and rows.max() <= np.iinfo(name).max)
-        )  # fmt: skip
+        low, high = int(rows.min(initial=0)), int(rows.max(initial=0))
+        kinds = [kind for kind in TYPES if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max]
+        if not kinds:
+            raise ModelError(
+                f"numbers from {low} to {high} do not fit 32 bits: the model is too large for a page"
+            )
+        kind = kinds[0]
         bits = 8 * int(kind[1])
         change = np.diff(rows, axis=0, prepend=0)
         change = (change + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)

@@ -48,7 +48,7 @@ SWAY_STEP = 1 / 8192
 class Reduced:
     """The parts of a figure with fewer vertices.
 
-    rows: int64 (W,), the vertices of the model that stay, in their new order. header: what describes the parts.
+    rows: int64 (W,), vertices of the model that stay, in their new order. header: what describes the parts.
     """
 
     rows: Int64
@@ -56,7 +56,7 @@ class Reduced:
 
 
 Chosen = tuple[Part | BodyPart, Int32, int, FaceShape | None]
-"""A part, its triangles (F, 3) that are shown, its first vertex in the model, and its shape; eyeballs have none."""
+"""A part, its triangles (F, 3) that are shown, its first vertex in the model, its shape (not of eyeballs)."""
 
 
 def reduce_parts(container: Container, parts: Iterable[Chosen]) -> Reduced:
@@ -79,6 +79,12 @@ def reduce_parts(container: Container, parts: Iterable[Chosen]) -> Reduced:
         rows.append(chosen + start)
         header.append(entry)
     return Reduced(np.concatenate(rows), header)
+
+
+def fewer_triangles(shape: FaceShape, error: float) -> Int32:
+    """Return the triangles of a shape (F, 3) with an error of the surface in metres; 0 for all."""
+    fewer = None if shape.coarser is None else shape.coarser.triangles_within(error)
+    return shape.triangles if fewer is None else fewer
 
 
 def order_triangles(triangles: Int32) -> Int64:
@@ -139,8 +145,9 @@ def _smaller_picture(data: bytes) -> bytes:
         return data
     from PIL import Image
 
-    picture = Image.fromarray(load_picture(data).pixels)
-    if picture.getextrema()[3][0] == 255:
+    loaded = load_picture(data)
+    picture = Image.fromarray(loaded.pixels)
+    if loaded.opaque:
         picture = picture.convert("RGB")
     picture.thumbnail((TEXTURE_SIZE, TEXTURE_SIZE), Image.Resampling.LANCZOS)
     result = io.BytesIO()
@@ -151,7 +158,7 @@ def _smaller_picture(data: bytes) -> bytes:
 def pack_face_parts(
     container: Container, figure: FaceFigure, parts: Iterable[Chosen]
 ) -> tuple[dict[str, Any], Int64]:
-    """Return the header of a face with these parts, and the model's vertices that stay, in their new order."""
+    """Return the header of a face, and the vertices of its model that stay, in their new order."""
     model, size = figure.model, figure.scale
     reduced = reduce_parts(container, parts)
     subject = figure.subject
@@ -191,7 +198,7 @@ def pack_face_parts(
 
 
 def pack_rules(model: FaceModel) -> dict[str, Any]:
-    """Return how a face fills in what is not sent: definitions by FAP of each viseme and expression, and its FIT."""
+    """Return how a face fills in what is not sent: FAPs of each viseme and expression, and its FIT."""
     tables = (model.definitions.visemes, model.definitions.expressions)
     return {
         "definitions": [
@@ -265,9 +272,9 @@ def shifts_at_borders(mesh: FaceDefMesh, chosen: Int64, unit: float) -> tuple[Fl
 
 
 def factorise(shifts: Float64, error: float, step: float) -> tuple[Float64, Float64]:
-    """Return curves (R, K) and shapes (R, N, 3), multiples of a step, whose products are near shifts (K, N, 3).
+    """Return curves (R, K) and shapes (R, N, 3), multiples of a step, whose products are shifts (K, N, 3).
 
-    No number is off by more than `error`, as far as the rounding to steps allows.
+    No number is off by more than `error`, as far as rounding to steps allows.
     """
     flat = shifts.reshape(len(shifts), -1)
     left, sizes, right = np.linalg.svd(flat, full_matrices=False)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fba.arrays import Int32, Int64
+from fba.arrays import Int64
 from fba.body import BodyModel
 from fba.face import FaceModel
 from fba_player._figure._face_parts import detail_levels
@@ -16,7 +16,7 @@ from fba_player._figure.person import Person, build_person
 from fba_player.view._view import FaceShape
 from fba_player.web._body_packing import pack_body_parts
 from fba_player.web._container import Container
-from fba_player.web._face_packing import Chosen, pack_face_parts
+from fba_player.web._face_packing import Chosen, fewer_triangles, pack_face_parts
 
 VERSION = 1
 DETAIL = 0.0002
@@ -67,17 +67,16 @@ def pack_figure(figure: FaceFigure, person: Person | None, detail: float) -> Pac
 def _choose(figure: FaceFigure, shapes: dict[str, FaceShape], detail: float, *, eyes: bool) -> list[Chosen]:
     """Return the parts of a face that are shown, with fewer triangles. eyes: whether eyeballs are."""
     model, balls = figure.model, {part.name for part, _ in figure.eyeballs if eyes}
+    error = detail * figure.scale
     chosen: list[Chosen] = []
     for part in model.parts:
         shape, triangles = shapes.get(part.name), part.triangles
-        fewer: Int32 | None = None
         if shape is not None:
-            triangles = shape.triangles
-            fewer = shape.coarser and shape.coarser.triangles_within(detail * figure.scale)
+            triangles = fewer_triangles(shape, error)
         elif part.name in balls:
-            levels = detail_levels(part, [part.vertices])
-            fewer = levels.triangles_within(EYE_DETAIL * detail * figure.scale)
+            fewer = detail_levels(part, [part.vertices]).triangles_within(EYE_DETAIL * error)
+            triangles = triangles if fewer is None else fewer
         else:
             continue
-        chosen.append((part, triangles if fewer is None else fewer, model.starts[part.name], shape))
+        chosen.append((part, triangles, model.starts[part.name], shape))
     return [each for each in chosen if len(each[1])]

@@ -1,7 +1,7 @@
 /** Poses a body by BAPs: what `fba.body.BapSolver` and `fba.body.footing` do, and its head as FAPs turn it. */
 import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.js";
 import { IDENTITY, invertRigid, multiply } from "./matrices.js";
-import { readParts, Shading } from "./parts.js";
+import { Shading, normalise, readParts } from "./parts.js";
 import { Skin } from "./skin.js";
 
 /** @typedef {import("./container.js").Container} Container */
@@ -87,8 +87,16 @@ export class Body {
     /** Their normals. */
     this.normals = new Float32Array(this._rest.length);
     this.parts = readParts(container, header.parts, this.positions, this.normals);
-    for (const { positions, triangles, normals, count: size } of this.parts) normals.set(new Shading(triangles, positions, new Uint8Array(size)).rest);
-    this._restNormals = this.normals.slice();
+    const modelled = container.fractions(header.normals, "the normals of the body", this._rest.length / 3, 3);
+    normalise(modelled, modelled);
+    this._surface = new Float32Array(this._rest.length);
+    this._shadings = this.parts.map(({ positions, triangles, count: size, first }) => {
+      const shading = new Shading(triangles, positions, new Uint8Array(size).fill(1));
+      this._surface.set(shading.rest, 3 * first);
+      return shading;
+    });
+    /** What the normals as modelled are besides those of the triangles. */
+    this._besides = modelled.map((number, at) => number - this._surface[at]);
     this._skin = new Skin(container, header.skin, this._rest.length / 3, count, parents, this.inverse);
     this._ground = header.standard ? readGround(header, this._solver) : null;
     const skull = checkedNumber(header.skull, "the skull", count);
@@ -125,7 +133,10 @@ export class Body {
       for (let at = 13; at < joints.length; at += 16) joints[at] += lift;
     }
     this._turnHead(headMatrix);
-    this._skin.apply(joints, this._rest, this._restNormals, this.positions, this.normals);
+    this._skin.apply(joints, this._rest, this._besides, this.positions, this.normals);
+    this.parts.forEach(({ first, count, positions }, at) => this._shadings[at].update(positions, this._surface.subarray(3 * first, 3 * (first + count))));
+    for (let at = 0; at < this.normals.length; at += 1) this.normals[at] += this._surface[at];
+    normalise(this.normals, this.normals);
   }
 
   /** @param {Float64Array} turn */

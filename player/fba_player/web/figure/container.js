@@ -84,7 +84,8 @@ export class Container {
     const origin = checkedNumbers(reference.origin, what, found.columns);
     const step = checkedNumber(reference.step, what);
     checkShape(found, what, rows, columns);
-    return Float32Array.from(found.values, (value, at) => value * step + origin[at % found.columns]);
+    const { values, columns: width } = found;
+    return new Float32Array(values.length).map((_, at) => values[at] * step + origin[at % width]);
   }
 
   /** Return whole numbers, of which all are below a limit. @param {unknown} place @param {string} what @param {number} limit @param {number} [rows] @param {number} [columns] */

@@ -54,8 +54,8 @@ function surface(container, entry, count, what) {
   return {
     colour: checkedNumbers(entry.colour, `the colour of ${what}`, 3),
     gloss: checkedNumber(entry.gloss, `the gloss of ${what}`),
-    colours: coded && Float32Array.from({ length: 3 * count }, (_, at) => coded[4 * Math.floor(at / 3) + (at % 3)] ** 2),
-    glosses: coded && Float32Array.from({ length: count }, (_, at) => coded[4 * at + 3]),
+    colours: coded && new Float32Array(3 * count).map((_, at) => coded[4 * Math.floor(at / 3) + (at % 3)] ** 2),
+    glosses: coded && new Float32Array(count).map((_, at) => coded[4 * at + 3]),
     texture,
     texcoords: texture && container.fractions(entry.texcoords, `the texture coordinates of ${what}`, count, 2),
     opacity: checkedNumber(entry.opacity, `the opacity of ${what}`),
@@ -71,7 +71,7 @@ export class Shading {
   /** @param {Uint32Array} triangles @param {Float32Array} rest neutral positions of the part @param {Uint8Array} moving which vertices may move by themselves */
   constructor(triangles, rest, moving) {
     const count = rest.length / 3;
-    const alone = Uint32Array.from({ length: count }, (_, at) => at);
+    const alone = new Uint32Array(count).map((_, at) => at);
     const own = new Float32Array(3 * count);
     sum(triangles, triangles, rest, own);
     normalise(own, own);
@@ -81,7 +81,7 @@ export class Shading {
     sum(triangles, corners, rest, sums);
     normalise(sums, sums);
     /** Neutral normals. */
-    this.rest = Float32Array.from(own, (_, at) => sums[3 * this._group[Math.floor(at / 3)] + (at % 3)]);
+    this.rest = own.map((_, at) => sums[3 * this._group[Math.floor(at / 3)] + (at % 3)]);
     const changing = new Uint8Array(count);
     for (let at = 0; at < triangles.length; at += 3) {
       if (moving[triangles[at]] || moving[triangles[at + 1]] || moving[triangles[at + 2]]) {
@@ -89,7 +89,7 @@ export class Shading {
       }
     }
     const used = (/** @type {number} */ at) => changing[corners[at]] || changing[corners[at + 1]] || changing[corners[at + 2]];
-    const chosen = Uint32Array.from(Array.from({ length: triangles.length / 3 }, (_, at) => 3 * at).filter(used));
+    const chosen = new Uint32Array(triangles.length / 3).map((_, at) => 3 * at).filter(used);
     this._triangles = expandTriangles(triangles, chosen);
     this._corners = expandTriangles(corners, chosen);
     this._vertices = alone.filter((at) => changing[this._group[at]]);
@@ -121,7 +121,7 @@ export class Shading {
 
 /** @param {Uint32Array} corners @param {Uint32Array} chosen first corners of triangles */
 function expandTriangles(corners, chosen) {
-  return Uint32Array.from({ length: 3 * chosen.length }, (_, at) => corners[chosen[Math.floor(at / 3)] + (at % 3)]);
+  return new Uint32Array(3 * chosen.length).map((_, at) => corners[chosen[Math.floor(at / 3)] + (at % 3)]);
 }
 
 /** Add the normal of each triangle, twice its area long, to its corners in sums. @param {Uint32Array} triangles @param {Uint32Array} corners @param {Float32Array} positions @param {Float32Array} sums */
@@ -152,10 +152,16 @@ function sum(triangles, corners, positions, sums) {
 }
 
 /** Scale vectors to length 1; those without a direction point forward. @param {Float32Array} vectors @param {Float32Array} out */
-function normalise(vectors, out) {
+export function normalise(vectors, out) {
   for (let at = 0; at < vectors.length; at += 3) {
-    const length = Math.hypot(vectors[at], vectors[at + 1], vectors[at + 2]);
-    for (let axis = 0; axis < 3; axis += 1) out[at + axis] = length > 1e-15 ? vectors[at + axis] / length : Number(axis === 2);
+    const x = vectors[at];
+    const y = vectors[at + 1];
+    const z = vectors[at + 2];
+    const length = Math.sqrt(x * x + y * y + z * z);
+    const still = !(length > 1e-15);
+    out[at] = still ? 0 : x / length;
+    out[at + 1] = still ? 0 : y / length;
+    out[at + 2] = still ? 1 : z / length;
   }
 }
 
@@ -166,8 +172,11 @@ function groups(positions, normals, alone) {
   return alone.map((vertex) => {
     const at = 3 * vertex;
     const key = `${positions[at]} ${positions[at + 1]} ${positions[at + 2]}`;
-    const here = leaders.get(key) ?? [];
-    leaders.set(key, here);
+    const here = leaders.get(key);
+    if (!here) {
+      leaders.set(key, [vertex]);
+      return vertex;
+    }
     const same = here.find((other) => {
       const from = 3 * other;
       return normals[at] * normals[from] + normals[at + 1] * normals[from + 1] + normals[at + 2] * normals[from + 2] > SAME_SURFACE;

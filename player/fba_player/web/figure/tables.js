@@ -1,5 +1,5 @@
 /** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py. */
-/** Columns of the FAPs that each unsent FAP copies: its mate, its lip mate, and the mate of that. */
+/** Columns of the FAPs that each FAP copies: its mate, its lip mate, and the mate of that. */
 export const DONORS = [
   [0, 1, 2, 3, 4, 6, 5, 8, 7, 10, 9, 12, 11, 13, 14, 15, 16, 17, 19, 18, 21, 20, 23, 22, 25, 24, 27, 26, 29, 28, 31, 30, 33, 32, 35, 34, 37, 36, 39, 38, 41, 40, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 53, 52, 55, 54, 57, 56, 59, 58, 61, 60, 62, 63, 65, 64, 67, 66],
   [0, 1, 2, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 60, 61, 62, 63, 64, 65, 66, 67],

@@ -1,0 +1,71 @@
+/**
+ * Write what figures show: node show_figure.mjs REQUEST. A request names a figure's file and streams, each with frames and a
+ * file for the results: for each frame 68 FAPs, the positions without the neck's bend of a head (of a person: the matrices of
+ * its joints), then the positions and normals of all parts, as 64-bit numbers. Or it names a figure's file and holds faces:
+ * the result is the FAPs that are shown. Or it names damaged figures: the result is their messages, "" for those that can
+ * be shown.
+ */
+import { readFileSync, writeFileSync } from "node:fs";
+import { FbaError, decode } from "../../../player/fba_player/web/fba.js";
+import { Figure } from "../../../player/fba_player/web/figure/figure.js";
+import { Resolver } from "../../../player/fba_player/web/figure/resolve.js";
+import { Timeline } from "../../../player/fba_player/web/figure/timeline.js";
+
+const request = JSON.parse(readFileSync(process.argv[2], "utf8"));
+if (request.damaged) {
+  writeFileSync(request.result, JSON.stringify(request.damaged.map(message)));
+} else {
+  const figure = new Figure(readFileSync(request.figure));
+  if (request.faces) {
+    const resolver = new Resolver(figure.rules);
+    const rows = request.faces.map((face) => {
+      const arrays = { values: Int32Array.from(face.values), mask: Uint8Array.from(face.mask), interpolated: Uint8Array.from(face.interpolated) };
+      const row = new Float32Array(68);
+      resolver.push({ ...face, ...arrays }, row);
+      return row;
+    });
+    write(request.result, rows);
+  }
+  for (const { stream, frames, result } of request.streams ?? []) write(result, shown(figure, decode(readFileSync(stream)), frames));
+}
+
+function shown(figure, animation, frames) {
+  const timeline = new Timeline(animation, figure.rules);
+  const faps = new Float32Array(68);
+  const baps = new Float64Array(296);
+  return frames.flatMap((frame) => {
+    const time = animation.time(frame);
+    timeline.faps(time, faps);
+    figure.show(faps, figure.body ? timeline.baps(time, baps) : undefined);
+    const parts = ["positions", "normals"].flatMap((what) => figure.parts.map((part) => part[what].slice()));
+    return [faps.slice(), figure.body ? figure.body.joints.slice() : rigid(figure.face), ...parts];
+  });
+}
+
+/** The positions of a face if all of it turns with the head. */
+function rigid(face) {
+  const positions = new Float32Array(face.positions.length);
+  face.place(positions, new Float32Array(positions.length), { bend: false });
+  return positions;
+}
+
+function write(file, arrays) {
+  const joined = new Float64Array(arrays.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const each of arrays) {
+    joined.set(each, at);
+    at += each.length;
+  }
+  writeFileSync(file, joined);
+}
+
+function message(file) {
+  try {
+    const figure = new Figure(readFileSync(file));
+    figure.show(new Float64Array(68).fill(100), new Float64Array(296).fill(1000));
+    return "";
+  } catch (error) {
+    if (!(error instanceof FbaError)) throw error;
+    return error.message;
+  }
+}
