@@ -119,6 +119,7 @@ def command(
         model=inputs.read_model(look.model),
         body=inputs.read_body(look.body, joints),
         with_body=any(each.animation.body is not None for each in read),
+        with_head=any(each.animation.body is None for each in read),
         audio=audio,
         audio_offset=sound.audio_offset,
         title=look.title,

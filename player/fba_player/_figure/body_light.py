@@ -83,6 +83,11 @@ class BodyLight:
         _interpolate(past, near, shares, folds, light)
         return light
 
+    @property
+    def open_sky(self) -> Float32:
+        """(V,): the share of the sky that the body's folds leave to each vertex."""
+        return self._prepared[3]
+
     @cached_property
     def _prepared(self) -> Prepared:
         """Data for the V vertices of all parts that do not change with the pose.

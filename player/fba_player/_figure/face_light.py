@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -62,6 +63,11 @@ class FaceLight:
         lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
         self._tongues = [part_rows(model, part.name) for part in model.of_kind("tongue")]
+
+    @property
+    def lips(self) -> Sequence[int]:
+        """The two vertices of the lips whose distance says how far the mouth is open; none in some models."""
+        return self._lips or ()
 
     def shade(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
         """Return float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.

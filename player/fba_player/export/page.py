@@ -69,6 +69,8 @@ def make_page(
     model: FaceModel | None = None,
     body: BodyModel | None = None,
     with_body: bool = False,
+    with_head: bool = True,
+    live: bool = False,
     audio: PathLike | None = None,
     audio_offset: float = 0.0,
     title: str = "",
@@ -77,8 +79,9 @@ def make_page(
 ) -> str:
     """Return a page, as HTML, that plays streams side by side.
 
-    model, body: the figure, by default the built-in ones. with_body: whether a stream has a body. audio: a
-    sound file that begins audio_offset seconds after the first frame; it goes into the page as it is.
+    model, body: the figure, by default the built-in ones. with_body, with_head: whether it holds a person for
+    streams with a body, and a head for those without. live: whether it shows a stream of the server that it
+    comes from (`fba.serving`) instead of its own. audio: a sound file that begins audio_offset seconds after the first frame; it goes into the page as it is.
     title: of the page, by default the names of the streams. view: one of `VIEWS`, by default what suits the
     content. loop: whether to begin again at the end.
 
@@ -87,7 +90,12 @@ def make_page(
     content: dict[str, Any] = {
         "title": title or " | ".join(stream.name for stream in streams) or "FBA",
         "sources": [_source(stream) for stream in streams],
-        "model": _encoded(pack_figure(model, body if with_body else None, with_body=with_body)),
+        "figures": [
+            _encoded(pack_figure(model, body if person else None, with_body=person))
+            for person in (True, False)
+            if (with_body if person else with_head)
+        ],
+        "live": live,
         "view": view,
         "loop": loop,
     }
@@ -124,7 +132,8 @@ def animation_page(animation: Animation, **options: Any) -> str:
 
     encoded = encode_animation(animation)
     stream = PageStream(animation.name or "animation", encoded.data)
-    return make_page([stream], with_body=animation.body is not None, **options)
+    with_body = animation.body is not None
+    return make_page([stream], with_body=with_body, with_head=not with_body, **options)
 
 
 def _source(stream: PageStream) -> dict[str, str]:

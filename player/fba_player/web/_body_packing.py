@@ -13,9 +13,10 @@ from fba.body.skeleton import SIDES, Skeleton
 from fba.body.skin._skinning import Skinner
 from fba.body.solve import _pose_loops as pose_loops
 from fba.body.solve.conventions import convention
+from fba_player._figure.body_light import UNOBSTRUCTED_LIGHT
 from fba_player._figure.person import Person, head_middle
 from fba_player.web._container import Container, rounded
-from fba_player.web._face_packing import STEP, Chosen, fewer_triangles, reduce_parts
+from fba_player.web._face_packing import LIGHT_STEP, STEP, Chosen, fewer_triangles, reduce_parts
 
 WEIGHT_STEP = 1 / 16384
 """Weights and shares of twists are multiples of it."""
@@ -54,6 +55,7 @@ def pack_body_parts(
         "standard": _pack_skeleton(default) if grounded else None,
         "soles": [_soles(default), _soles(skeleton)] if grounded else [],
         "bind": [matrix.T.ravel().tolist() for matrix in body.bind],
+        "light": _pack_light(container, person, reduced.rows),
         "skull": skull,
         "turn": turn,
         "place": place,
@@ -61,6 +63,14 @@ def pack_body_parts(
         "faceSkin": None if head is None else _pack_skin(container, head.skinner, face_rows),
     }
     return header, reduced.rows
+
+
+def _pack_light(container: Container, person: Person, rows: Int64) -> dict[str, Any]:
+    """Return the light on a body, which its folds shade, as `FaceMesh.light`."""
+    folds = person.light.open_sky[rows].astype(np.float64)
+    key, sky, through, rim = UNOBSTRUCTED_LIGHT
+    lit = [np.full_like(folds, key), sky * folds, np.full_like(folds, through), rim * folds]
+    return {"shut": container.add_fractions(np.clip(np.stack(lit, axis=1), 0, 1), LIGHT_STEP)}
 
 
 def _pack_skeleton(skeleton: Skeleton) -> dict[str, Any]:

@@ -23,8 +23,9 @@ from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
 from fba.face.feature_points import names
 from fba.face.interpolation._terms import HIGH_LEVEL_NUMBERS, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.parameters import fap_numbers, faps
+from fba.parameters import FAP_COUNT, fap_numbers, faps
 from fba_player._figure.face import FaceFigure
+from fba_player._figure.face_light import MOUTH_OPEN
 from fba_player._mesh.textures import load_picture
 from fba_player.view._view import FaceShape
 from fba_player.web._container import Container, rounded
@@ -42,6 +43,10 @@ TEXTURE_SIZE = 1024
 TEXTURE_QUALITY = 80
 COORDINATE_STEP = 1 / 8192
 SWAY_STEP = 1 / 8192
+LIGHT_STEP = 1 / 255
+HAIR_STEP = 1 / 127
+WIDTH_STEP = 1e-6
+"""Metres: widths of hairs are multiples of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +128,7 @@ def _pack_surface(
         "alpha": material.alpha,
         "cutoff": material.cutoff,
         "twoSided": material.two_sided if shape is None else shape.two_sided,
-        "hair": shape is not None and shape.across is not None,
+        **_pack_shape(container, shape, rows),
     }
     if part.colours is not None:
         colours = part.colours[rows].astype(np.float64)
@@ -136,6 +141,23 @@ def _pack_surface(
     if picture is not None and part.texcoords is not None:
         header["texture"] = container.add_bytes(_smaller_picture(picture))
         header["texcoords"] = container.add_fractions(part.texcoords[rows], COORDINATE_STEP)
+    return header
+
+
+def _pack_shape(container: Container, shape: FaceShape | None, rows: Int64) -> dict[str, Any]:
+    """Return how shaders draw a part, as `FaceShape` says; eyeballs, without a shape, have one of their own."""
+    if shape is None:
+        return {"ball": True}
+    header: dict[str, Any] = {
+        "scatter": shape.scatter,
+        "closed": shape.closed,
+        "smooth": shape.smooth,
+        "opaque": shape.picture is None or shape.picture.opaque,
+    }
+    if shape.across is not None:
+        across = shape.across[rows].astype(np.float64)
+        header["across"] = container.add_fractions(np.delete(across, 3, axis=1), HAIR_STEP)
+        header["widths"] = container.add_fractions(across[:, 3:4], WIDTH_STEP)
     return header
 
 
@@ -163,6 +185,7 @@ def pack_face_parts(
     reduced = reduce_parts(container, parts)
     subject = figure.subject
     places = {part["name"]: place for place, part in enumerate(reduced.header)}
+    number = {int(row): place for place, row in enumerate(reduced.rows)}
     sways = np.ones(len(model.vertices), dtype=np.float32)
     for name, shape in figure.shapes.items():
         sways[figure.rows(name)] = shape.sway
@@ -187,14 +210,35 @@ def pack_face_parts(
                 "part": places[part.name],
                 "centre": ball.centre.tolist(),
                 "numbers": [ball.side, ball.radius, ball.iris, ball.pupil, ball.step],
+                "lids": [number.get(row, -1) for row in ball.lids],
             }
             for part, ball in figure.eyeballs
             if part.name in places
         ],
+        "light": _pack_light(container, figure, reduced.rows),
         **pack_rules(model),
         **_pack_motion(container, figure, reduced.rows),
     }
     return header, reduced.rows
+
+
+def _pack_light(container: Container, figure: FaceFigure, rows: Int64) -> dict[str, Any]:
+    """Return the light on an upright face, mouth shut and wide open: key, sky, through the skin, rim.
+
+    lips: the vertices between which `gaps` are measured (m); None for a face whose light does not change.
+    """
+    lit = []
+    for values in ({}, MOUTH_OPEN):
+        faps = np.zeros(FAP_COUNT, dtype=np.float32)
+        for fap, value in values.items():
+            faps[fap - 1] = value
+        shares = figure.light.shade(figure.pose(faps).positions, np.eye(3), np.eye(3))
+        lit.append(container.add_fractions(np.clip(shares[rows], 0, 1), LIGHT_STEP))
+    number = {int(row): place for place, row in enumerate(rows)}
+    lips = [number.get(row, -1) for row in figure.light.lips]
+    opens = len(lips) == 2 and min(lips) >= 0
+    gaps = rounded(figure.light.baked.gaps)
+    return {"shut": lit[0], "wide": lit[1], "lips": lips, "gaps": gaps} if opens else {"shut": lit[0]}
 
 
 def pack_rules(model: FaceModel) -> dict[str, Any]:

@@ -3,14 +3,21 @@ import { Body } from "./body.js";
 import { Container, checkedNumber, checkedNumbers, refuse } from "./container.js";
 import { Face } from "./face.js";
 import { IDENTITY, multiply } from "./matrices.js";
+import { readLight } from "./parts.js";
 import { Skin } from "./skin.js";
 
 /** @typedef {import("./parts.js").Part} Part */
+/** @typedef {import("./parts.js").Light} Light */
+/** The parts of a body or a face, and the arrays of all their vertices. @typedef {{parts: Part[], positions: Float32Array, normals: Float32Array, light: Light}} Mesh */
 
 /**
- * An eyeball, which is a part of the face, too. centre, radius: in the frame of matrix, which leads into the world. iris,
- * pupil: their diameters. All in metres.
- * @typedef {{part: Part, matrix: Float64Array, centre: Float64Array, radius: number, iris: number, pupil: number}} Eye
+ * An eyeball, which is a part of the face, too. centre, radius: in the frame of matrix, which leads into the world, and of
+ * local, which leads into that of the face. iris, pupil: their diameters. All in metres. lids: vertices of the face at the
+ * middles of upper and lower lid and at the corners, -1 for those that it lacks.
+ * @typedef {{
+ *   part: Part, matrix: Float64Array, local: Float64Array, centre: Float64Array, radius: number, iris: number, pupil: number,
+ *   lids: number[],
+ * }} Eye
  */
 
 const VERSION = 1;
@@ -46,12 +53,31 @@ export class Figure {
     /** All parts, to be drawn. @type {Part[]} */
     this.parts = [...(this.body?.parts ?? []), ...shown];
     this._shown = shown;
+    /** The same by body and face, for those who draw all at once. @type {Mesh[]} */
+    this.meshes = [];
+    if (this.body) this.meshes.push({ ...pick(this.body), light: readLight(container, header.body.light ?? {}, this.body.positions.length / 3) });
+    if (shown.length) this.meshes.push({ parts: shown, positions: this._positions, normals: this._normals, light: readLight(container, header.face.light ?? {}, this._positions.length / 3) });
     /** @type {(Eye & {side: number, widest: number, step: number, number: number})[]} */
     this._eyes = (header.face.eyes ?? []).map((/** @type {Record<string, any>} */ eye) => {
       const number = checkedNumber(eye.part, "the part of an eye", shown.length);
       const [side, radius, iris, widest, step] = checkedNumbers(eye.numbers, "an eye", 5);
       const matrix = Float64Array.from(IDENTITY);
-      return { part: shown[number], number, matrix, centre: checkedNumbers(eye.centre, "the centre of an eye", 3), side, radius, iris, pupil: widest, widest, step };
+      const count = this.face.positions.length / 3;
+      const lids = checkedNumbers(eye.lids, "the lids of an eye", 4);
+      return {
+        part: shown[number],
+        number,
+        matrix,
+        local: this.face.partMatrices[number],
+        lids: [...lids].map((row) => (row < 0 ? -1 : checkedNumber(row, "a vertex of a lid", count))),
+        centre: checkedNumbers(eye.centre, "the centre of an eye", 3),
+        side: checkedNumber(side, "the side of an eye", 2),
+        radius,
+        iris,
+        pupil: widest,
+        widest,
+        step,
+      };
     });
     /** From the frame of the face's model into the world, the head turned. */
     this.faceMatrix = this.body?.faceMatrix ?? this.face.headMatrix;
@@ -116,6 +142,11 @@ export class Figure {
     this.face.place(this._positions, this._normals);
     this._shown.forEach((part, at) => (part.changed = turned || this.face.parts[at].changed));
   }
+}
+
+/** @param {Body} body */
+function pick({ parts, positions, normals }) {
+  return { parts, positions, normals };
 }
 
 /** @param {Float64Array} before @param {ArrayLike<number>} now */

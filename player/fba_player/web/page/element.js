@@ -49,7 +49,8 @@ export class FBAPlayer extends HTMLElement {
     this._loading = 0;
     this._due = 0;
     this._toastTimer = 0;
-    this._live = /** @type {{timeline: LiveTimeline, since: number, lost: number, stream: LiveStream} | null} */ (null);
+    /** @type {{figure: ReturnType<typeof makeFigure> | null, timeline: LiveTimeline | null, since: number, lost: number, stream: LiveStream} | null} */
+    this._live = null;
     this._listen();
   }
 
@@ -239,7 +240,7 @@ export class FBAPlayer extends HTMLElement {
         const animation = decoded(name, bytes, bapSteps);
         warnings.push(...animation.damage.map(({ error }) => `${name}: ${error.message}`));
         const frames = framesOf(animation);
-        const { figure, resolver } = makeFigure(shown, frames);
+        const { figure, resolver } = makeFigure(shown, frames.hasBody, frames.hasFace);
         const timeline = new Timeline(frames, resolver);
         figure.measure(timeline);
         performers.push({ name, figure, timeline });
@@ -263,15 +264,15 @@ export class FBAPlayer extends HTMLElement {
     this._loading += 1;
     this._live?.stream.close();
     this.model = model;
-    const { figure, resolver } = makeFigure(model);
     const live = {
-      timeline: new LiveTimeline(resolver.copy()),
+      figure: /** @type {ReturnType<typeof makeFigure> | null} */ (null),
+      timeline: /** @type {LiveTimeline | null} */ (null),
       since: NaN,
       lost: 0,
       stream: new LiveStream(url, {
         hello: (titles, number) => (document.title = titles[number] ?? document.title),
-        start: () => (live.timeline = new LiveTimeline(resolver.copy())),
-        frames: (frames) => this._receive(figure, frames),
+        start: () => (live.timeline = null),
+        frames: (frames) => this._receive(frames),
         lost: (planes) => this.toast(`${(live.lost += planes)} planes lost: this page or its connection is too slow`),
         end: () => this.toast("the stream has ended"),
         state: (state, seconds) => this._showState(state, seconds),
@@ -281,17 +282,21 @@ export class FBAPlayer extends HTMLElement {
     this._live = live;
   }
 
-  /** @param {ReturnType<typeof makeFigure>["figure"]} figure @param {import("../decoder/frames.js").StreamFrame[]} frames */
-  _receive(figure, frames) {
-    const live = this._live;
-    if (!live) return;
+  /** @param {import("../decoder/frames.js").StreamFrame[]} frames */
+  _receive(frames) {
+    const { _live: live, model } = this;
+    if (!live || !model) return;
+    const begins = !live.timeline;
+    live.figure ??= makeFigure(model, frames.some(({ body }) => body), frames.some(({ face }) => face));
+    live.timeline ??= new LiveTimeline(live.figure.resolver.copy());
     live.timeline.push(frames);
     const now = performance.now() / 1000;
     if (!(Math.abs(now - live.since - live.timeline.newest) < LIVE_SLACK)) live.since = now - live.timeline.newest;
     this.dispatchEvent(new CustomEvent("frames", { detail: frames.length }));
-    if (this._performers[0]?.timeline === live.timeline) return;
-    if (this._performers[0]?.figure !== figure) this._setPerformers([{ name: "", figure, timeline: live.timeline }], []);
-    this._performers[0].timeline = live.timeline;
+    if (!begins) return;
+    const { figure } = live.figure;
+    if (this._performers[0]?.figure === figure) this._performers[0].timeline = live.timeline;
+    else this._setPerformers([{ name: "", figure, timeline: live.timeline }], []);
     this._say("");
     this.playback.playing = true;
     this._changed("loadedmetadata");
@@ -360,7 +365,7 @@ export class FBAPlayer extends HTMLElement {
     try {
       const name = this.src.split("/").pop() ?? this.src;
       const steps = /** @type {"iso" | "visage" | null} */ (this.getAttribute("bap-steps"));
-      this._model ??= fetched(this.getAttribute("model") ?? new URL("head.fbam", import.meta.url).href).then(readModel);
+      this._model ??= fetched(this.getAttribute("model") ?? new URL("head.fbam", import.meta.url).href).then((file) => readModel(file));
       const [bytes, model] = await Promise.all([fetched(this.src), this._model]);
       if (loading === this._loading) await this.show([{ name, bytes, ...(steps ? { bapSteps: steps } : {}) }], model);
     } catch (error) {
@@ -473,7 +478,7 @@ export class FBAPlayer extends HTMLElement {
     const { playback } = this;
     if (this._live) {
       const { since, timeline } = this._live;
-      if (playback.playing) playback.time = Math.min(performance.now() / 1000 - since - LIVE_DELAY, timeline.newest);
+      if (playback.playing && timeline) playback.time = Math.min(performance.now() / 1000 - since - LIVE_DELAY, timeline.newest);
     } else if (playback.advance()) this._changed("ended");
     if (this._stage && this._performers.length) {
       this._stage.resize();
@@ -577,7 +582,7 @@ export class FBAPlayer extends HTMLElement {
     const [file] = event.dataTransfer?.files ?? [];
     if (!file) return;
     const bytes = new Uint8Array(await file.arrayBuffer());
-    const model = this.model ?? (this._model ??= fetched(this.getAttribute("model") ?? "").then(readModel));
+    const model = this.model ?? (this._model ??= fetched(this.getAttribute("model") ?? "").then((file) => readModel(file)));
     this.playback.audio?.pause();
     this.playback.audio = null;
     await this.show([{ name: file.name, bytes }], model);

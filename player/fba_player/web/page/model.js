@@ -4,8 +4,9 @@ import { Resolver } from "../figure/resolve.js";
 import { IDENTITY, multiply } from "./matrix.js";
 
 /**
- * A model, and the pictures of its parts by their place among the parts of its figure.
- * @typedef {{bytes: Uint8Array, pictures: Map<number, ImageBitmap>}} Model
+ * Figures to choose from: a head, a person or both. Of each its file, whether it has a body, and the pictures of its parts by
+ * their place.
+ * @typedef {{bytes: Uint8Array, hasBody: boolean, pictures: Map<number, ImageBitmap>}[]} Model
  * @typedef {import("./renderer.js").Shape} Shape
  * @typedef {import("./camera.js").Subject} Subject
  * @typedef {import("./timeline.js").Timeline} Timeline
@@ -32,11 +33,17 @@ export async function unzipped(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** Return the model in a file, packed by gzip or not; its pictures are decoded. @param {Uint8Array} file @returns {Promise<Model>} */
-export async function readModel(file) {
+/** Return the model in files, packed by gzip or not; pictures are decoded. @param {Uint8Array[]} files @returns {Promise<Model>} */
+export function readModel(...files) {
+  return Promise.all(files.map(readFigure));
+}
+
+/** @param {Uint8Array} file */
+async function readFigure(file) {
   const bytes = file[0] === 0x1f && file[1] === 0x8b ? await unzipped(file) : file;
+  const figure = new Figure(bytes);
   const pictures = new Map();
-  for (const [place, { texture, name }] of new Figure(bytes).parts.entries()) {
+  for (const [place, { texture, name }] of figure.parts.entries()) {
     if (!texture) continue;
     try {
       pictures.set(place, await createImageBitmap(new Blob([/** @type {BlobPart} */ (texture)]), { premultiplyAlpha: "none", colorSpaceConversion: "none" }));
@@ -44,19 +51,21 @@ export async function readModel(file) {
       throw new Error(`the model's picture of part "${name}" cannot be decoded`);
     }
   }
-  return { bytes, pictures };
+  return { bytes, hasBody: figure.body !== null, pictures };
 }
 
 /**
- * Return the figure that a model makes for a performance, and what resolves its FAPs.
- * @param {Model} model @param {import("./timeline.js").Frames} [frames] of the performance; none where they are still to come
+ * Return the figure for a performance, and what resolves its FAPs.
+ * @param {Model} model @param {boolean} hasBody whether a body moves @param {boolean} hasFace whether a face does
  */
-export function makeFigure({ bytes, pictures }, frames) {
-  const figure = new Figure(bytes);
-  if (frames?.hasBody && !frames.hasFace && !figure.body) {
+export function makeFigure(model, hasBody, hasFace) {
+  const chosen = model.find((packed) => packed.hasBody === hasBody) ?? model[0];
+  if (!chosen) throw new Error("the page has no figure");
+  if (hasBody && !hasFace && !chosen.hasBody) {
     throw new Error("the stream moves a body, and this page has a head alone; make the page again with fba export");
   }
-  return { figure: new Drawn(figure, pictures), resolver: new Resolver(figure.rules) };
+  const figure = new Figure(chosen.bytes);
+  return { figure: new Drawn(figure, chosen.pictures), resolver: new Resolver(figure.rules) };
 }
 
 /** A figure as it is drawn: a `Figure` of the stage. */
@@ -72,7 +81,7 @@ class Drawn {
         shape: shapeOf(parts, lit, (part) => pictures.get(before + part) ?? null),
         positions,
         normals,
-        light: light ? light.shut.slice() : new Float32Array(4 * lit).fill(1),
+        light: light.shut.slice(),
         source: light,
         world: IDENTITY,
         turn: [0, 0, 0],
@@ -149,10 +158,11 @@ class Drawn {
     };
   }
 
-  /** Let light into an open mouth. @param {{source: import("../figure/figure.js").Light | null, light: Float32Array, share: number}} mesh */
+  /** Let light into an open mouth. @param {{source: import("../figure/figure.js").Light, light: Float32Array, share: number}} mesh */
   _shade(mesh) {
     const { source } = mesh;
-    if (!source?.wide) return;
+    const { wide } = source;
+    if (!wide) return;
     const [upper, lower] = source.lips.map((lip) => 3 * lip);
     const at = this._figure.face.positions;
     const gap = Math.hypot(at[upper] - at[lower], at[upper + 1] - at[lower + 1], at[upper + 2] - at[lower + 2]);
@@ -160,7 +170,7 @@ class Drawn {
     const share = Math.round(Math.min(Math.max(open, 0), 1) ** MOUTH_CURVE * 100) / 100;
     if (share === mesh.share) return;
     mesh.share = share;
-    for (let k = 0; k < mesh.light.length; k += 1) mesh.light[k] = source.shut[k] + share * (source.wide[k] - source.shut[k]);
+    for (let k = 0; k < mesh.light.length; k += 1) mesh.light[k] = source.shut[k] + share * (wide[k] - source.shut[k]);
   }
 
   /** @param {import("../figure/figure.js").Eye} eye @returns {import("./renderer.js").Eye} */
@@ -222,10 +232,10 @@ function shapeOf(parts, count, pictureOf) {
     }
     if (part.texcoords) texcoords?.set(part.texcoords, 2 * part.first);
     if (part.across) across?.set(part.across, 8 * part.first);
-    const { scatter, closed, smooth, twoSided, opaque, alpha, opacity, cutoff, hair, ball } = part;
+    const { scatter, closed, smooth, twoSided, opaque, alpha, opacity, cutoff, ball } = part;
     if (!ball) {
       const picture = part.texcoords ? pictureOf(place) : null;
-      drawn.push({ first: triangles.length, count: part.triangles.length, picture, opaque, scatter, twoSided, closed, hairs: hair, smooth, alpha, opacity, cutoff, wrinkled: false });
+      drawn.push({ first: triangles.length, count: part.triangles.length, picture, opaque, scatter, twoSided, closed, hairs: part.across !== null, smooth, alpha, opacity, cutoff, wrinkled: false });
       for (const corner of part.triangles) triangles.push(corner + part.first);
     }
   }

@@ -1,11 +1,13 @@
 /** The page of `fba export`: shows the streams that are inside it, or those that arrive. */
-import { readModel, unzipped } from "./model.js";
+import { streamUrl } from "./live.js";
+import { readModel } from "./model.js";
 
 /**
- * What the page holds. data, model: base64, the model gzipped as well. audio: a data URI.
+ * What the page holds. data, figures: base64, the figures gzipped as well. audio: a data URI. live: whether streams come from
+ * where the page came from.
  * @typedef {{
- *   title: string, sources: {name: string, data: string, bapSteps?: "iso" | "visage"}[], model: string, audio?: string,
- *   audioOffset?: number, view?: string, loop?: boolean,
+ *   title: string, sources: {name: string, data: string, bapSteps?: "iso" | "visage"}[], figures: string[], audio?: string,
+ *   audioOffset?: number, view?: string, loop?: boolean, live?: boolean,
  * }} Content
  */
 
@@ -30,10 +32,15 @@ export function startPage(text) {
 /** @param {Content} content */
 async function start(content) {
   const player = /** @type {import("./element.js").FBAPlayer} */ (document.querySelector("fba-player"));
-  const model = unzipped(bytesOf(content.model)).then(readModel);
+  const model = readModel(...content.figures.map(bytesOf));
   if (content.view) player.setAttribute("view", content.view);
   if (content.loop) player.loop = true;
   if (content.audio) player.setAudio(content.audio, content.audioOffset ?? 0);
+  if (content.live) {
+    const number = Number(new URLSearchParams(location.search).get("n") ?? 0);
+    player.showLive(streamUrl(location.href.replace(/[?#].*/, ""), number), await model);
+    return;
+  }
   const sources = content.sources.map(({ name, data, bapSteps }) => ({ name, bytes: bytesOf(data), ...(bapSteps ? { bapSteps } : {}) }));
   await player.show(sources, model);
   followLink(player);
