@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Int64
+from fba.body import BodyModel
 from fba.body.footing import SOLE, has_feet
-from fba.body.head_attachment import skull_of
+from fba.body.head_attachment import AttachedHead, skull_of
 from fba.body.skeleton import SIDES, Skeleton
-from fba.body.skin._skinning import Skinner
-from fba.body.solve import _pose_loops as pose_loops
 from fba.body.solve.conventions import convention
 from fba_player._figure.body_light import UNOBSTRUCTED_LIGHT
 from fba_player._figure.person import Person, head_middle
@@ -59,8 +58,8 @@ def pack_body_parts(
         "skull": skull,
         "turn": turn,
         "place": place,
-        "skin": _pack_skin(container, body.skinner, reduced.rows),
-        "faceSkin": None if head is None else _pack_skin(container, head.skinner, face_rows),
+        "skin": _pack_skin(container, body, reduced.rows),
+        "faceSkin": None if head is None else _pack_skin(container, head, face_rows),
     }
     return header, reduced.rows
 
@@ -89,7 +88,7 @@ def _pack_skeleton(skeleton: Skeleton) -> dict[str, Any]:
             for name in skeleton.names
         ],
         "translation": rules.translation.tolist(),
-        "metres": (rules.translation_sign * pose_loops.MILLIMETRE).tolist(),
+        "metres": (rules.translation_sign / 1000).tolist(),
     }
 
 
@@ -103,8 +102,9 @@ def _soles(skeleton: Skeleton) -> list[list[float]]:
     return points
 
 
-def _pack_skin(container: Container, skinner: Skinner, rows: Int64) -> dict[str, Any]:
+def _pack_skin(container: Container, carried: BodyModel | AttachedHead, rows: Int64) -> dict[str, Any]:
     """Return how joints carry vertices. rows: (W,), those that stay, in their new order."""
+    skinner = carried.skinner
     number = np.full(len(skinner.vertices), -1)
     number[rows] = np.arange(len(rows))
     twists, girdle = skinner.twists, skinner.girdle

@@ -3,13 +3,13 @@
 "FBAW", the length of the header (uint32, little-endian as all numbers), the header: JSON in UTF-8, then the
 bytes of the arrays. `arrays` in the header lists them; other members name one by its place in that list. An
 array: [type, rows, columns, first byte after the header, coding]. Types: u1, i1, u2, i2, u4, i4. Codings,
-which make gzip's work easier, store the bytes of one column after the other, of each first the lowest bytes of all
-rows, then the next:
+which make gzip's work easier, store the bytes of one column after the other: first the lowest bytes of all
+its rows, then the next. Coded are:
 
-- "delta": of the difference from the row above, modulo the type, as 2 d for d >= 0 and -2 d - 1 below.
-- "rise", for corners of triangles that are numbered in the order in which they first occur: how far below
-  the number of those that occurred before; 0 for the next new one.
-- "bytes": of a file, such as a picture; one column.
+- "delta": the difference from the row above, modulo the type, as 2 d for d >= 0 and -2 d - 1 below.
+- "rise", for corners of triangles, numbered in the order in which they first occur: by how much each is below
+  the number of those that occurred before, 0 for the next new one; one column.
+- "bytes": those of a file, such as a picture; one column.
 
 Fractions are whole multiples of a step: {"array": place, "step": step, "origin": [one per column]}.
 """

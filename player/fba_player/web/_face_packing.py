@@ -17,13 +17,9 @@ import numpy as np
 
 from fba.arrays import Float64, Int32, Int64
 from fba.body.model import BodyPart
-from fba.face import FaceModel, Part
-from fba.face._tables import FaceDefMesh
+from fba.face import FaceDefMesh, FaceModel, InterpolationTable, Part, Term, feature_point_names
 from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
-from fba.face.feature_points import names
-from fba.face.interpolation._terms import HIGH_LEVEL_NUMBERS, Term
-from fba.face.interpolation.table import InterpolationTable
-from fba.parameters import FAP_COUNT, fap_numbers, faps
+from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, faps
 from fba_player._figure.face import FaceFigure
 from fba_player._figure.face_light import MOUTH_OPEN
 from fba_player._mesh.textures import load_picture
@@ -202,7 +198,7 @@ def pack_face_parts(
         },
         "points": {
             name: place.tolist()
-            for name, place in zip(names(), model.points, strict=True)
+            for name, place in zip(feature_point_names(), model.points, strict=True)
             if np.isfinite(place).all()
         },
         "eyes": [
@@ -337,10 +333,8 @@ def _pack_fit(table: InterpolationTable) -> list[dict[str, Any]]:
 
     Numbers are named by places: FAPs by their columns, then the fields of viseme and expression.
     """
-    fields = [name for high in ("viseme", "expression") for name in HIGH_LEVEL_NUMBERS[high]]
-    places = {fap.name: fap.number - 1 for fap in faps()} | {
-        name: len(faps()) + place for place, name in enumerate(fields)
-    }
+    names = [*(fap.name for fap in faps()), *VISEME_FIELDS[:3], *EXPRESSION_FIELDS[:4]]
+    places = {name: place for place, name in enumerate(names)}
 
     def terms(listed: Iterable[Term]) -> list[list[Any]]:
         return [
@@ -352,11 +346,10 @@ def _pack_fit(table: InterpolationTable) -> list[dict[str, Any]]:
             for term in listed
         ]
 
-    numbers = fap_numbers()
     return [
         {
             "fap": fap,
-            "source": [numbers[name] - 1 for name in link.source],
+            "source": [places[name] for name in link.source],
             "numerator": terms(function.numerator),
             "denominator": terms(function.denominator),
         }

@@ -19,7 +19,7 @@ from fba_player.web._container import Container
 from fba_player.web._face_packing import Chosen, fewer_triangles, pack_face_parts
 
 VERSION = 1
-DETAIL = 0.0002
+DETAIL = 0.0
 """Error of surfaces in metres, for a face of an adult's size."""
 EYE_DETAIL = 0.25
 """That of eyeballs, as a share: they are looked at most."""

@@ -18,8 +18,7 @@ import fba
 from fba.arrays import Float64
 from fba.body import BodyModel
 from fba.body.footing import GroundedPoser
-from fba.face import FaceModel, resolve
-from fba.face.interpolation.table import Function, InterpolationTable, Link, Term
+from fba.face import FaceModel, Function, InterpolationTable, Link, Term, resolve
 from fba.tracks import FaceTrack
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._figure.person import Person, build_person
