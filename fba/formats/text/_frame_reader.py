@@ -273,8 +273,8 @@ class _Reader:
 def _renumber(index: Int64, lines: Int64, path: Path) -> Int64:
     """Return frame numbers that increase: where a number does not, the frame follows the frame before.
 
-    Such files are joined from others, or their program writes 0 for every frame. Warns with FbaWarning. Raises
-    FormatError for numbers that would be too large.
+    Such files are joined from others, or their program writes 0 for every frame. Warns with FbaWarning.
+    Raises FormatError for numbers that would be too large.
     """
     steps = np.diff(index)
     repeated = steps <= 0
@@ -291,8 +291,8 @@ def _renumber(index: Int64, lines: Int64, path: Path) -> Int64:
     if renumbered[-1] > FRAME_NUMBER_MAX:
         beyond = int(np.argmax(renumbered > FRAME_NUMBER_MAX))
         raise FormatError(
-            f"the frame would get the number {int(renumbered[beyond])}, at most {FRAME_NUMBER_MAX} is allowed; "
-            "number the frames from 0",
+            f"the frame would get the number {int(renumbered[beyond])}, at most {FRAME_NUMBER_MAX} is "
+            "allowed; number the frames from 0",
             path=path,
             line=int(lines[beyond]),
         )

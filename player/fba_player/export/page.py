@@ -30,6 +30,8 @@ MOST_SOUND_BYTES = 64_000_000
 """Largest sound that goes into a page."""
 BUNDLE = "dist/fba-player.min.js"
 """The player in JavaScript, in the package `fba_player.web`."""
+BUILT_IN = {False: "dist/head.fbam", True: "dist/person.fbam"}
+"""The built-in head and person, which tools/web/make_figures.py packs."""
 VIEWS = ("front", "three-quarter", "profile", "body")
 
 _PAGE = """<!doctype html>
@@ -81,9 +83,9 @@ def make_page(
 
     model, body: the figure, by default the built-in ones. with_body, with_head: whether it holds a person for
     streams with a body, and a head for those without. live: whether it shows a stream of the server that it
-    comes from (`fba.serving`) instead of its own. audio: a sound file that begins audio_offset seconds after the first frame; it goes into the page as it is.
-    title: of the page, by default the names of the streams. view: one of `VIEWS`, by default what suits the
-    content. loop: whether to begin again at the end.
+    comes from (`fba.serving`) instead of its own. audio: a sound file that begins audio_offset seconds after
+    the first frame; it goes into the page as it is. title: of the page, by default the names of the streams.
+    view: one of `VIEWS`, by default what suits the content. loop: whether to begin again at the end.
 
     Raises FormatError for a sound that browsers do not play, or that is too large.
     """
@@ -119,10 +121,12 @@ def pack_figure(
     model, body: by default the built-in ones. with_body: whether a body without a model is the built-in one,
     not left out.
     """
-    if body is None and not with_body:
-        packed = pack_face(model or FaceModel.default())
-    else:
-        packed = pack_body(body or BodyModel.default(), model)
+    person = with_body or body is not None
+    if model is None and body is None:
+        return (files("fba_player.web") / BUILT_IN[person]).read_bytes()
+    packed = (
+        pack_body(body or BodyModel.default(), model) if person else pack_face(model or FaceModel.default())
+    )
     return gzip.compress(packed, 9, mtime=0)
 
 

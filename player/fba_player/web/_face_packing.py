@@ -141,7 +141,7 @@ def _pack_surface(
 
 
 def _pack_shape(container: Container, shape: FaceShape | None, rows: Int64) -> dict[str, Any]:
-    """Return how shaders draw a part, as `FaceShape` says; eyeballs, without a shape, have one of their own."""
+    """Return how shaders draw a part, as `FaceShape` says; eyeballs, without a shape, have their own."""
     if shape is None:
         return {"ball": True}
     header: dict[str, Any] = {

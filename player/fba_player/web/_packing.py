@@ -51,9 +51,11 @@ def pack_body(body: BodyModel, face: FaceModel | None = None, *, detail: float =
     return pack_figure(figure, build_person(body, figure), detail).data
 
 
-def pack_figure(figure: FaceFigure, person: Person | None, detail: float) -> Packed:
-    """Return a head, or the person that it is the head of."""
-    container, header = Container(), dict[str, Any](version=VERSION)
+def pack_figure(
+    figure: FaceFigure, person: Person | None, detail: float = DETAIL, *, source: str = ""
+) -> Packed:
+    """Return a head, or the person that it is the head of. source: what it was made of, kept in its header."""
+    container, header = Container(), dict[str, Any](version=VERSION, source=source)
     body_rows = np.zeros(0, dtype=np.int64)
     shapes = figure.shapes if person is None else person.face_shapes
     with_eyes = person is None or person.head is not None
