@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -21,10 +20,10 @@ INTRA_PERIOD = 2
 
 
 def make_page(titles: Sequence[str]) -> bytes:
-    """Return the page that shows streams with these titles."""
-    streams = "".join(f"<li><code>stream?n={n}</code> {html.escape(title)}" for n, title in enumerate(titles))
-    text = f"<p>Streams, each a WebSocket:<ul>{streams}</ul>"
-    return f"<!doctype html><meta charset=utf-8><title>fba</title>{text}".encode("utf-8", "replace")
+    """Return the page that shows streams with these titles: faces on the built-in head, bodies as a person."""
+    from fba_player.export.page import make_page
+
+    return make_page([], with_body=True, live=True, title=" | ".join(titles)).encode()
 
 
 @contextmanager

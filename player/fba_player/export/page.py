@@ -40,6 +40,7 @@ _PAGE = """<!doctype html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy" content="{policy}">
 <title>{title}</title>
+<link rel="icon" href="data:,">
 <style>
 html, body {{ margin: 0; height: 100%; background: #45484c; font: 14px system-ui, sans-serif; }}
 fba-player {{ position: fixed; inset: 0; border-radius: 0; }}

@@ -54,7 +54,7 @@ def pack_body(body: BodyModel, face: FaceModel | None = None, *, detail: float =
 def pack_figure(
     figure: FaceFigure, person: Person | None, detail: float = DETAIL, *, source: str = ""
 ) -> Packed:
-    """Return a head, or the person that it is the head of. source: what it was made of, kept in its header."""
+    """Return a head, or the person that it is the head of. source: of what it is made, for its header."""
     container, header = Container(), dict[str, Any](version=VERSION, source=source)
     body_rows = np.zeros(0, dtype=np.int64)
     shapes = figure.shapes if person is None else person.face_shapes

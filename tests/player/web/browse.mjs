@@ -2,7 +2,7 @@
  * Use a page in a real browser, without a network: node browse.mjs MODULES < steps.json > results.json
  *
  * MODULES: a folder with playwright-core and puppeteer-core. Input: {browser: "chromium" or "firefox", path of the program,
- * page: a file, size: [width, height], steps: [...]}. A step has one of: wait (an expression that becomes true), run (an
+ * page: a file, or the address of a server, size: [width, height], steps: [...]}. A step has one of: wait (an expression that becomes true), run (an
  * expression, whose value is the result), key, click (a selector inside of the player), drag ([from, to] as shares of the
  * picture), wheel, size, shot (a file to write). Output: {results: one for each step, errors: what the page reported}.
  */
@@ -17,7 +17,7 @@ const [browser, page] = await (kind === "firefox" ? openFirefox() : openChromium
 const errors = [];
 page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
 page.on("pageerror", (error) => errors.push(String(error.message ?? error)));
-await page.goto(`file://${file}`);
+await page.goto(file.includes("://") ? file : `file://${file}`);
 const results = [];
 for (const step of steps) results.push(await take(step));
 process.stdout.write(JSON.stringify({ results, errors }));
@@ -30,7 +30,7 @@ async function openChromium() {
     "--disable-component-update", "--disable-sync", "--autoplay-policy=no-user-gesture-required",
   ];
   const browser = await chromium.launch({ executablePath: path, args, timeout: PATIENCE });
-  const context = await browser.newContext({ viewport: { width: size[0], height: size[1] }, offline: true });
+  const context = await browser.newContext({ viewport: { width: size[0], height: size[1] }, offline: !file.includes("://") });
   context.setDefaultTimeout(PATIENCE);
   return [browser, await context.newPage()];
 }

@@ -21,6 +21,7 @@ from PIL import Image
 import fba
 from fba.animation import Animation
 from fba.cli.main import group
+from fba.serving import Server, show_file, split_stream
 from fba_player.export.page import PageStream, make_page
 
 SAMPLES = Path(__file__).parents[3] / "fba" / "samples"
@@ -69,7 +70,7 @@ def browse(request: pytest.FixtureRequest, tmp_path: Path) -> Browse:
         content = {
             "browser": browser,
             "path": _program(browser),
-            "page": str(file),
+            "page": page if page.startswith("http:") else str(file),
             "size": size,
             "steps": steps,
         }
@@ -278,3 +279,24 @@ def test_the_sound_is_the_clock(browse: Browse, hello: Animation, tmp_path: Path
     )["results"]
     assert results[4] is True
     assert results[6] is True
+
+
+def test_live(browse: Browse, hello: Animation) -> None:
+    stream = split_stream(fba.encode(hello, fba.EncoderOptions(intra_period=25, start_codes=True)))
+    page = make_page([], with_body=True, live=True).encode()
+    with Server(page, ["hello"], port=0) as server:
+        server.start(0, lambda stage: show_file(stage, stream, loop=True))
+        count = f"{PLAYER}.addEventListener('frames', ({{detail}}) => window.count += detail)"
+        heard = f"(window.count ??= ({count}, 1))"
+        results = browse(
+            server.url,
+            [
+                {"wait": f"{PLAYER}?.readyState === 4"},
+                {"wait": f"{heard} > 20"},
+                {"run": f"{PLAYER}.paused"},
+                {"run": f"{PLAYER}.duration === Infinity"},
+                {"run": "document.title"},
+            ],
+        )
+    assert results["errors"] == []
+    assert results["results"][2:] == [False, True, "hello"]
