@@ -66,7 +66,6 @@ fba.planning._encoding
 fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion
-fba.capture.sampling
 fba.capture._limbs
 fba.capture.comparison
 fba.capture.blendshapes

@@ -26,7 +26,7 @@ from scipy.optimize import lsq_linear
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from fba.capture.blendshapes.shape_table import amounts_of  # noqa: E402
+from fba.capture import shape_faps  # noqa: E402
 from fba.errors import FbaError  # noqa: E402
 from fba.face import Deformer  # noqa: E402
 from fba.face.feature_points import row_of  # noqa: E402
@@ -195,7 +195,7 @@ def touch(row: str, medians: dict[str, np.ndarray]) -> None:
     """Make lids that close and lips that are brought together touch, and no more."""
     values = medians[row]
     if "Look" in row:
-        before = amounts_of(row.split("(", maxsplit=1)[0] + "Left" if "(" in row else row)
+        before = shape_faps(row.split("(", maxsplit=1)[0] + "Left" if "(" in row else row)
         eyes = [fap.number - 1 for fap in faps() if fap.name.startswith(("yaw", "pitch"))]
         values[eyes] = np.sign(before[eyes]) * [MEASURED[faps()[eye].name.split("_")[0]] for eye in eyes]
     if row.startswith("eyeBlink"):
@@ -282,7 +282,7 @@ def main() -> None:
         touch(row, medians)
         correct(row, median)
         share = np.median([one for name in names for one in shares.get(name, [])])
-        set_before = amounts_of(names[0])
+        set_before = shape_faps(names[0])
         lines[row] = as_text(median, len(names) > 1)
         print(f"\n{row}: {share:.0%} of the motion")
         print("  before ", as_text(set_before, len(names) > 1))

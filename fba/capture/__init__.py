@@ -12,6 +12,7 @@ from fba.capture.blendshapes import (
     ShapeMotion,
     from_action_units,
     from_blendshapes,
+    shape_faps,
     to_blendshapes,
 )
 from fba.capture.markers._faces import from_markers
@@ -42,5 +43,6 @@ __all__ = [
     "measure_bones",
     "retarget_motion",
     "retarget_report",
+    "shape_faps",
     "to_blendshapes",
 ]

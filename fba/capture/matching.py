@@ -12,8 +12,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import islice
 
-from fba.body import Skeleton
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, Skeleton
 from fba.errors import ModelError, Remedy
 from fba.name_maps import both_sides, simplify
 from fba.parameters import joints

@@ -18,8 +18,7 @@ from fba.emotion._rules import Rules, limited
 from fba.emotion.expression import FAMILIES, Expression, whissel_points
 from fba.errors import OptionError, did_you_mean
 from fba.face import Definitions
-from fba.face.mates import fill
-from fba.parameters import EXPRESSIONS, FAP_COUNT, fap_numbers
+from fba.parameters import EXPRESSIONS, FAP_COUNT, fap_numbers, fill_from_mates
 
 
 def expressions() -> tuple[Expression, ...]:
@@ -83,7 +82,7 @@ def _drawn_faps() -> dict[str, Float32]:
             name, column = row["expression"], fap_numbers()[row["fap"]] - 1
             values.setdefault(name, np.zeros(FAP_COUNT, dtype=np.float32))[column] = float(row["value"])
             listed.setdefault(name, np.zeros(FAP_COUNT, dtype=bool))[column] = True
-    return {name: fill(row, listed[name])[0].astype(np.float32) for name, row in values.items()}
+    return {name: fill_from_mates(row, listed[name])[0].astype(np.float32) for name, row in values.items()}
 
 
 def _recipe(text: str) -> tuple[tuple[str, float], ...]:

@@ -1,5 +1,6 @@
 """What the standard tabulates: FAPs, BAPs, groups, feature points and joints."""
 
+from fba.parameters._mates import fill_from_mates, mate_columns
 from fba.parameters._tables import (
     BAP_COUNT,
     BAP_GROUP_COUNT,
@@ -34,6 +35,7 @@ from fba.parameters._tables import (
     faps,
     feature_points,
     joints,
+    point_rows,
 )
 
 __all__ = [
@@ -69,5 +71,8 @@ __all__ = [
     "fap_steps",
     "faps",
     "feature_points",
+    "fill_from_mates",
     "joints",
+    "mate_columns",
+    "point_rows",
 ]

@@ -265,3 +265,9 @@ def fap_numbers() -> dict[str, int]:
 def bap_numbers() -> dict[str, int]:
     """BAP number by name."""
     return {b.name: b.number for b in baps()}
+
+
+@cache
+def point_rows() -> dict[str, int]:
+    """Return the row of each feature point, by name, in arrays of all 84."""
+    return {point.name: row for row, point in enumerate(feature_points())}

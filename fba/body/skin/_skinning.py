@@ -21,8 +21,8 @@ from fba.body.skin._girdle import Girdle, find_girdle
 from fba.body.skin._loops import Twisting
 from fba.body.skin._moving_normals import normal_rings
 from fba.choices import SkinMethod
-from fba.easing import smoothstep
 from fba.mesh import result_array
+from fba.sampling import smoothstep
 
 METHODS: tuple[SkinMethod, ...] = get_args(SkinMethod)
 """Ways to blend the motion of several joints."""

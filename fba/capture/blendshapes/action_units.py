@@ -11,8 +11,8 @@ import numpy as np
 from fba.animation import Animation
 from fba.capture.blendshapes._motion import ActionUnitMotion, ShapeMotion
 from fba.capture.blendshapes.conversion import from_blendshapes
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import ModelError
+from fba.face import arkit_names
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import read_table
 
@@ -35,7 +35,7 @@ def to_shapes(motion: ActionUnitMotion) -> ShapeMotion:
     if not known:
         units = ", ".join(map(str, motion.units)) or "no unit"
         raise ModelError(f"no action unit is known here: {units}")
-    used = [name for name in ARKIT_ORDER if any(name in unit_shapes()[unit] for unit in known)]
+    used = [name for name in arkit_names() if any(name in unit_shapes()[unit] for unit in known)]
     weights = np.zeros((len(motion), len(used)))
     for column, unit in enumerate(motion.units):
         for name, share in unit_shapes().get(unit, {}).items():

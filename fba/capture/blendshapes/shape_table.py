@@ -14,30 +14,16 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.face import Definitions
+from fba.face import Definitions, arkit_of
 from fba.face.gltf.morphs import morph_values
-from fba.face.shape_names import arkit_of, fap_of
-from fba.name_maps import both_sides
+from fba.face.shape_names import fap_of
+from fba.name_maps import both_sides, key_of
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
 from fba.source import read_table
 
-ARKIT_ORDER = tuple(
-    """
-    eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft eyeWideLeft
-    eyeBlinkRight eyeLookDownRight eyeLookInRight eyeLookOutRight eyeLookUpRight eyeSquintRight eyeWideRight
-    jawForward jawLeft jawRight jawOpen mouthClose mouthFunnel mouthPucker mouthLeft mouthRight
-    mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight mouthDimpleLeft mouthDimpleRight
-    mouthStretchLeft mouthStretchRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper
-    mouthPressLeft mouthPressRight mouthLowerDownLeft mouthLowerDownRight mouthUpperUpLeft mouthUpperUpRight
-    browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft
-    cheekSquintRight noseSneerLeft noseSneerRight tongueOut
-    """.split()  # noqa: SIM905 - fifty lines otherwise
-)
-"""ARKit's 52 shapes in the order of ARKit's and Live Link Face's own data."""
-
 
 @cache
-def amounts_of(name: str) -> Float64 | None:
+def shape_faps(name: str) -> Float64 | None:
     """Return FAPs (68,) of the shape of this name at weight 1; None for an unknown name."""
     number = fap_of(name)
     if number is not None:
@@ -65,11 +51,6 @@ def with_mates(sent: Bool) -> Bool:
         if fap.left_right_mate is not None and sent[fap.left_right_mate - 1]:
             result[fap.number - 1] = True
     return result
-
-
-def key_of(name: str) -> str:
-    """Return the letters and digits of a name, in lower case."""
-    return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 @cache

@@ -8,8 +8,8 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture.markers._targets import LOWER_LIDS, PUPILS
-from fba.face.feature_points import row_of
 from fba.face.gaze import LARGEST_GAZE
+from fba.parameters import point_rows
 
 MAX_BLINK = 0.5
 """Longest duration of a blink at half its depth, in seconds."""
@@ -66,7 +66,7 @@ def find_gaze(moved: Float64, points: Float64, places: Collection[str], size: fl
         return None
     total, weight = np.zeros((len(moved), 2)), np.zeros(len(moved))
     for name in pupils:
-        shift = moved[:, row_of()[name]] / (EYEBALL_RADIUS * size)
+        shift = moved[:, point_rows()[name]] / (EYEBALL_RADIUS * size)
         most = np.sin(LARGEST_GAZE)
         pitch = -np.arcsin(np.clip(shift[:, 1], -most, most))
         yaw = np.arcsin(np.clip(shift[:, 0] / np.cos(pitch), -most, most))
@@ -86,7 +86,7 @@ def _open(moved: Float64, points: Float64, pupil: str, places: Collection[str]) 
     upper, lower = list(LOWER_LIDS.items())[PUPILS.index(pupil)]
     if not {upper, lower} <= set(places):
         return np.ones(len(moved))
-    above, below = row_of()[upper], row_of()[lower]
+    above, below = point_rows()[upper], point_rows()[lower]
     neutral = points[above, 1] - points[below, 1]
     opening = neutral + moved[:, above, 1] - moved[:, below, 1]
     return np.asarray((opening > MIN_OPENING * neutral).astype(np.float64))

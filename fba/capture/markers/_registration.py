@@ -10,8 +10,9 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.capture.markers._targets import LOWER_LIDS, target_points
 from fba.errors import ModelError, Remedy
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
 from fba.geometry import fit_similarity, principal_axes
+from fba.parameters import point_rows
 
 SIZE_RANGE = (0.6, 1.6)
 """Smallest and largest size of a face that is accepted, relative to an adult's."""
@@ -196,7 +197,7 @@ def complete_points(known: Mapping[str, Float64], template: Float64) -> Float64:
     moved, base = fit.apply(template), fit.apply(there)
     field = RBFInterpolator(base, here - base, kernel="linear", degree=0)
     result: Float64 = moved + field(moved)
-    rows = row_of()
+    rows = point_rows()
     for name, position in known.items():
         if name in rows:
             result[rows[name]] = position
@@ -208,7 +209,7 @@ def complete_points(known: Mapping[str, Float64], template: Float64) -> Float64:
 def _shut_lips(points: Float64, known: Mapping[str, Float64], template: Float64, scale: float) -> None:
     """Put the line between the lips, if it has no marker, half-way between two heights that real faces have:
     that of the mouth's corners, and that of the template."""
-    rows = row_of()
+    rows = point_rows()
     if "2.2" in known or not {"8.3", "8.4"} <= set(known):
         return
     inner = [rows[name] for name in ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9")]
@@ -220,7 +221,7 @@ def _shut_lips(points: Float64, known: Mapping[str, Float64], template: Float64,
 def _open_lids(points: Float64, known: Mapping[str, Float64]) -> None:
     """Open eyes without markers on both lids half-way between two openings: that of the template on a face of
     this size, and the width of an iris, which is alike in all adults."""
-    rows = row_of()
+    rows = point_rows()
     for upper, lower in LOWER_LIDS.items():
         if upper in known and lower in known:
             continue

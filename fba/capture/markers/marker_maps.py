@@ -11,9 +11,9 @@ from typing import Any
 from fba.capture.markers._targets import RIGID, SKULL, TARGETS
 from fba.capture.markers.motion import MarkerMotion
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError, did_you_mean
-from fba.face.feature_points import row_of
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import change_known_names, read_names, simplify, write_names
+from fba.parameters import point_rows
 from fba.source import Path, read_table
 
 TABLE = "markers"
@@ -130,11 +130,11 @@ def check_target(target: str) -> None:
     """Raise OptionError for a place where markers cannot be."""
     if target in TARGETS:
         return
-    if target in row_of():
+    if target in point_rows():
         raise OptionError(
             f"no marker can be at feature point {target}, which is inside the head or the mouth, or on hair"
         )
-    special = [name for name in RIGID if name not in row_of()]
+    special = [name for name in RIGID if name not in point_rows()]
     raise OptionError(
         f"there is no place {target!r}{did_you_mean(target, TARGETS)}; a marker is at a feature point of the "
         f"face, such as 2.1 or 8.3, or at {', '.join(special)}"

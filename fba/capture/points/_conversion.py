@@ -26,11 +26,11 @@ from fba.capture.points.places import (
     point_places,
     take_points,
 )
-from fba.capture.sampling import find_gaps, interpolate
 from fba.choices import Gaze
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.sampling import find_gaps, interpolate
 
 Neutral = str | int | tuple[float, float]
 GUESSED_DEPTH_FAPS = frozenset({14})

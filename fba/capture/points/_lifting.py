@@ -19,8 +19,7 @@ from fba.capture.markers._targets import PUPILS, RIGID
 from fba.capture.points.poses import Poses, fit_poses
 from fba.errors import ModelError
 from fba.face import FaceModel
-from fba.face.feature_points import row_of
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 
 MIN_STILL_POINTS = 5
 """Smallest number of still points that define a pose."""
@@ -91,7 +90,7 @@ def lift(
 
 def _know(places: list[str], template: Float64, model: FaceModel) -> Knowledge:
     """Return the knowledge of a face whose points are at these places."""
-    rows = [row_of().get(place) for place in places]
+    rows = [point_rows().get(place) for place in places]
     each = measure_responses(model).each
     moves = np.zeros((len(each), len(places), 3))
     for fap in faps()[2:]:

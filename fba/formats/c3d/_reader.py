@@ -13,12 +13,12 @@ import numpy as np
 
 from fba.arrays import Array, Float64, to_float64
 from fba.capture import MarkerMotion
-from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
 from fba.errors import FbaWarning, FormatError
 from fba.formats.c3d._parameters import BLOCK_BYTES, KEY, Parameters, read_parameters
-from fba.formats.markers._rows import file_rate, unique_names, without_subject
+from fba.formats.markers._rows import METRES, file_rate, unique_names, without_subject
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.sampling import regular_times
 from fba.source import Path, naming_file, read_whole
 
 COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
@@ -79,8 +79,10 @@ def read_markers(
     frames = min(frames, there)
     limits.check_frames(frames, f"{path}: a capture")
     limits.check_bytes(frames * points * 3 * 8 * 2, f"{path}: a capture", source=len(data))
-    if points > MAX_MARKERS:
-        raise FormatError(f"has {points} markers, more than the {MAX_MARKERS} that are read", path=path)
+    if points > MarkerMotion.MAX_MARKERS:
+        raise FormatError(
+            f"has {points} markers, more than the {MarkerMotion.MAX_MARKERS} that are read", path=path
+        )
     values = _positions(data, start, frames, points, analogue, scale, parameters)
     labels = unique_names(_labels(parameters, points), points)
     kept = _kept(parameters, labels)

@@ -23,12 +23,11 @@ from fba.arrays import Float64
 from fba.capture import SkeletonMotion
 from fba.capture.blendshapes.combination import JAW_OPEN
 from fba.capture.blendshapes.conversion import convert_rows
-from fba.capture.sampling import find_rate, interpolate
-from fba.capture.skeleton import check_memory
 from fba.errors import FormatError, Remedy
 from fba.formats.numpy_archives import ZIP, read_arrays
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.sampling import find_rate, interpolate
 from fba.source import Path, naming_file
 
 RATES = ("mocap_frame_rate", "mocap_framerate", "fps")
@@ -151,7 +150,7 @@ def _skeleton(read_in: _Motion, path: Path, limits: Limits) -> SkeletonMotion:
     count, joints = read_in.turns.shape[:2]
     table = _joints()[:joints]
     names = tuple(row[0] for row in table)
-    check_memory(limits, count, joints, f"{path}: a motion", read_in.turns.nbytes)
+    SkeletonMotion.check_memory(limits, count, joints, f"{path}: a motion", read_in.turns.nbytes)
     turns = Rotation.from_rotvec(read_in.turns.reshape(-1, 3)).as_quat().reshape(count, joints, 4)
     turns = np.roll(turns, 1, axis=2)
     upright = _to_y_up(turns[:, 0])

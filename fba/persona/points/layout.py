@@ -23,7 +23,7 @@ import numpy as np
 from fba.arrays import Float64, Int64, Intp
 from fba.face import feature_point_names as names
 from fba.face import neutral_points
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
 
 TRACKED = 64
 """Number of points of a tracker."""
@@ -63,7 +63,7 @@ def point_weights() -> Float64:
     weights = np.zeros((TRACKED + OUTLINE, len(names())))
     for row in _read("points.csv"):
         for name, share in _terms(row["at"]):
-            weights[int(row["number"]) - 1, row_of()[name]] += share
+            weights[int(row["number"]) - 1, point_rows()[name]] += share
     return _frozen(weights)
 
 
@@ -112,7 +112,7 @@ def depth_weights() -> Float64:
     weights[:SAME] = point_weights()[:SAME]
     for n, row in enumerate(_read("computed_vertices.csv")):
         if row["depth"]:
-            weights[SAME + n, row_of()[row["depth"]]] = 1.0
+            weights[SAME + n, point_rows()[row["depth"]]] = 1.0
         else:
             weights[SAME + n] = vertex_weights()[0, SAME + n] @ point_weights()
     return _frozen(weights)

@@ -14,8 +14,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, UInt8
 from fba.face import FaceModel
-from fba.face.model import point_row
-from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
+from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps, point_rows
 from fba.tracks import FaceTrack
 from fba_player.export._sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
 from fba_player.export.offscreen import Offscreen
@@ -151,7 +150,7 @@ def close_up(view: str, scene: Scene) -> Subject:
         return Subject((x, y + 0.05 * face.half_height, z), 0.86 * face.half_height, 0.86 * face.half_width)
     names, offset, half_height, half_width = close_ups[view]
     points = scene.model.points
-    middle = np.mean([points[point_row(name)] for name in names], axis=0) + offset
+    middle = np.mean([points[point_rows()[name]] for name in names], axis=0) + offset
     if not np.isfinite(middle).all():
         return face
     x, y, z = middle.tolist()

@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
 from fba.face import FaceModel
-from fba.face.model import point_row
+from fba.parameters import point_rows
 
 STEPS_BETWEEN_POINTS = 8
 """Number of steps between two feature points."""
@@ -42,7 +42,7 @@ def skin_lines(model: FaceModel) -> list[SkinLine]:
     skin = _build_skin_graph(model)
     lines = []
     for kind, names in rows:
-        bound = [int(model.bound[point_row(name)]) for name in names]
+        bound = [int(model.bound[point_rows()[name]]) for name in names]
         on_skin = [vertex for vertex in bound if vertex in skin.used]
         if len(on_skin) >= 2:
             line = skin.line(on_skin)

@@ -72,8 +72,7 @@ class Scene(Timed[Timeline]):
         self._extent: Extent | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
-            from fba.body import BodyModel
-            from fba.body.footing import GroundedPoser
+            from fba.body import BodyModel, GroundedPoser
             from fba_player.scene._bones import Bones
 
             self._body = body or BodyModel.default()

@@ -7,7 +7,7 @@ import time as wall
 from collections.abc import Callable
 from dataclasses import replace
 
-from fba.easing import smoothstep
+from fba.sampling import smoothstep
 from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 

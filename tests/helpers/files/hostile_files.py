@@ -364,7 +364,7 @@ def load_face(path: Path) -> object:
 
 def load_body(path: Path) -> object:
     """Load a body model."""
-    from fba.body.model import BodyModel
+    from fba.body import BodyModel
 
     return BodyModel.load(path)
 

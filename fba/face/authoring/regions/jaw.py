@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.easing import smoothstep
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion, fap_limits
 from fba.face.authoring.surface._motion_limits import human_range, linear_motion, stop_at_folds
@@ -19,6 +18,7 @@ from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.model import Part
 from fba.face.points import OPEN_JAW, TONGUE_ROLL
+from fba.sampling import smoothstep
 
 CHIN = ("2.1", "2.10", "2.11", "2.12")
 EARS = ("10.7", "10.8", "10.9", "10.10")

@@ -18,7 +18,6 @@ from fba.errors import ModelError, Remedy
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, flat_width, sphere
-from fba.face.feature_points import row_of
 from fba.face.importers.assembly._outlines import (
     find_eye_loop,
     lid_points_of_loop,
@@ -31,7 +30,7 @@ from fba.face.importers.assembly._warping import warp_points
 from fba.face.model import Part
 from fba.face.points import EYEBALL_PER_IRIS
 from fba.face.shape_names import canonical_names, fap_of
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 
 MIN_OUTSIDE_Z = 0.2
 """Skin whose normal has a smaller z than this is the inside of the mouth, or an ear."""
@@ -117,7 +116,7 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
 
     Shells that cannot be two eyes, such as a bun of hair, give nothing: they overlap, or differ in size.
     """
-    points = np.full((len(row_of()), 3), np.nan)
+    points = np.full((len(point_rows()), 3), np.nan)
     try:
         eyes = find_eyes(pieces, path)
     except ModelError:
@@ -131,7 +130,7 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
         if pupil[2] - centre[2] > MIN_PUPIL_DISTANCE * radius:
             found[PUPIL_POINT[side]] = pupil
     for name, position in found.items():
-        points[row_of()[name]] = position
+        points[point_rows()[name]] = position
     return points
 
 
