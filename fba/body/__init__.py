@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fba.body._definition import BodyDefinition
+    from fba.body._model import BodyModel, BodyPart
+    from fba.body._skeleton import ROOT, SIDES, Skeleton
     from fba.body.footing import GroundedPoser
     from fba.body.head_attachment import AttachedHead, attach_head
-    from fba.body.model import BodyModel, BodyPart
-    from fba.body.skeleton import ROOT, SIDES, Skeleton
     from fba.body.solve.conventions import convention_names
     from fba.body.solve.limits import Excess, JointLimit, JointLimits
     from fba.body.solve.solver import BapSolver, wrapped
@@ -20,8 +20,8 @@ _NAMES = {
     "_definition": ("BodyDefinition",),
     "footing": ("GroundedPoser",),
     "head_attachment": ("AttachedHead", "attach_head"),
-    "model": ("BodyModel", "BodyPart"),
-    "skeleton": ("ROOT", "SIDES", "Skeleton"),
+    "_model": ("BodyModel", "BodyPart"),
+    "_skeleton": ("ROOT", "SIDES", "Skeleton"),
     "solve.conventions": ("convention_names",),
     "solve.limits": ("Excess", "JointLimit", "JointLimits"),
     "solve.solver": ("BapSolver", "wrapped"),

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64, Int64
-from fba.body.skeleton import MAX_JOINTS, Skeleton
+from fba.body._skeleton import MAX_JOINTS, Skeleton
 from fba.errors import ModelError
 from fba.source import Path, read_whole
 

@@ -16,12 +16,12 @@ from fba.animation import Animation
 from fba.arrays import Float64, Int32
 from fba.body import BapSolver
 from fba.capture import _retarget as retarget
+from fba.capture._skeleton import solve_targets
 from fba.capture.blendshapes.combination import RADIAN
 from fba.capture.blendshapes.conversion import EYE_FAPS, HEAD_FAPS, convert_rows
 from fba.capture.blendshapes.shape_table import largest_amounts, shape_faps
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare, rest_on_frame
-from fba.capture.skeleton import solve_targets
 from fba.face import arkit_names
 from fba.limits import DEFAULT_LIMITS
 from fba.parameters import FAP_COUNT, fap_numbers

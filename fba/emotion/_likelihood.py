@@ -19,10 +19,10 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
 from fba.capture.blendshapes.action_units import unit_shapes
+from fba.emotion._expression import FAMILIES
+from fba.emotion._expressions import expressions
 from fba.emotion._features import features, known_features, measure
 from fba.emotion._profiles import measured_faps, measurements
-from fba.emotion.expression import FAMILIES
-from fba.emotion.expressions import expressions
 from fba.face import Definitions, resolve
 from fba.parameters import FAP_COUNT, fap_numbers
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32
+from fba.emotion._expressions import expressions
 from fba.emotion._moods import Mood, MoodCurve, check_spans, intensity_curves
 from fba.emotion._rules import Rules, limited
 from fba.emotion.blending import combine
-from fba.emotion.expressions import expressions
 from fba.errors import OptionError
 from fba.face import Definitions, FaceSettings, resolve
 from fba.parameters import FAP_COUNT, fap_numbers, fill_from_mates

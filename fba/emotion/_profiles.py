@@ -14,7 +14,7 @@ from importlib.resources import files
 import numpy as np
 
 from fba.arrays import Float32
-from fba.emotion.expression import FAMILIES
+from fba.emotion._expression import FAMILIES
 from fba.errors import OptionError, did_you_mean
 from fba.parameters import FAP_COUNT, fap_numbers
 

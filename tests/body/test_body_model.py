@@ -19,7 +19,7 @@ from fba.body._storage import build, read_body
 from fba.errors import FormatError, ModelError
 from fba.gltf._document import join_container, parse_document, split_container
 from fba.gltf._reader import read_document
-from fba.gltf.surfaces import surfaces
+from fba.gltf._surfaces import surfaces
 from fba.parameters import joints
 from json_places import REMOVED, put
 from small_bodies import random_pose, rod

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.virtual_markers import (
     MarkedHead,
     MarkerMapping,

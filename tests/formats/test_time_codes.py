@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers._motion import MarkerMotion
 from fba.errors import FormatError
 from fba.formats import format_of
 from fba.formats.time_codes import (

@@ -23,7 +23,7 @@ from sculpt import ORIGIN
 import figure
 from fba.arrays import Bool, Float64, Int64
 from fba.body import BodyModel, BodyPart, Skeleton
-from fba.body.model import Material
+from fba.body._model import Material
 from fba.body.skin.skin_weights import strongest_weights
 from fba.body.solve._bind_pose import FINGERS
 from fba.face import FaceModel

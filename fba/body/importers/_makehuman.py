@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int64
-from fba.body.model import BodyModel, BodyPart, Material
-from fba.body.skeleton import Skeleton
+from fba.body._model import BodyModel, BodyPart, Material
+from fba.body._skeleton import Skeleton
 from fba.body.skin.skin_weights import strongest_weights
 from fba.body.solve._bind_pose import (
     bind_matrices,

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.skeleton import Skeleton
+from fba.body._skeleton import Skeleton
 from fba.compiled import compiled, inlined
 from fba.sampling import smoothstep
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.skeleton import Skeleton
+from fba.body._skeleton import Skeleton
 from fba.body.skin import _loops as loops
 from fba.body.skin._girdle import Girdle, find_girdle
 from fba.body.skin._loops import Twisting

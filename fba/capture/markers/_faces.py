@@ -15,13 +15,13 @@ from fba.arrays import Float64, Intp
 from fba.capture.markers._exchanges import Exchange, undo_exchanges
 from fba.capture.markers._eyes import find_gaze, opening_by_blinks
 from fba.capture.markers._gaps import Filled, fill_gaps, often_seen, warn_of_gaps
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._neutral import neutral_frames
 from fba.capture.markers._registration import GIVE_MAP, Registration, complete_points, register
 from fba.capture.markers._solving import choose_unknowns, measure_responses, solve
 from fba.capture.markers._stabilisation import follow_head, relate_poses, remove_poses
 from fba.capture.markers._targets import LOWER_LIDS, PUPILS, RIGID
 from fba.capture.markers.marker_maps import check_map, find_map
-from fba.capture.markers.motion import MarkerMotion
 from fba.choices import Gaze
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel, Fapu

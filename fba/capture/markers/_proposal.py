@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._registration import GIVE_MAP, SIZE_RANGE, UNIT_FACTORS
 from fba.capture.markers._targets import PUPILS, SKULL, target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.geometry import fit_similarity

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import RIGID, SKULL, TARGETS
-from fba.capture.markers.motion import MarkerMotion
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError, did_you_mean
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import change_known_names, read_names, simplify, write_names

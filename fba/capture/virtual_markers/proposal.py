@@ -7,9 +7,9 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from fba.arrays import Float64
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import LIDS, RIGID, SKULL, target_points
 from fba.capture.markers.marker_maps import find_map
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers._alignment import lay_onto
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import lid_at, lid_height

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Bool, Int32
+from fba.face._resolve import known_faps
 from fba.face.interpolation.table import InterpolationTable, sources_of
-from fba.face.resolve import known_faps
 from fba.parameters import FAP_COUNT, mate_columns
 from fba.tracks import FaceTrack
 

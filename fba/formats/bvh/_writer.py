@@ -57,7 +57,7 @@ def write(
     (`fba.body.convention_names()`). unit: units in the file for one metre, by default centimetres.
 
     The root's OFFSET is 0 and its channels are world positions, because some programs add the two. Reading
-    the file returns the same BAPs (`fba.capture.skeleton.is_direct`); times begin at 0. Raises FormatError
+    the file returns the same BAPs (`fba.capture._skeleton.is_direct`); times begin at 0. Raises FormatError
     without a body, without frames, or for too many, OptionError for an unknown value of an option.
     """
     from fba.body import BapSolver

@@ -25,9 +25,9 @@ from fba_player._figure._face_parts import (
 from fba_player._figure.face_light import MOUTH_OPEN, FaceLight
 from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
+from fba_player.view._camera import Subject
 from fba_player.view._geometry import rotation_vector, transform
 from fba_player.view._view import Eye, FaceMesh, FaceShape
-from fba_player.view.camera import Subject
 
 MAX_ROUNDNESS_ERROR = 0.03
 """A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""

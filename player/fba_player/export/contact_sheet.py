@@ -16,11 +16,11 @@ from fba.arrays import Float32, UInt8
 from fba.face import FaceModel
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps, point_rows
 from fba.tracks import FaceTrack
+from fba_player.export._offscreen import Offscreen
 from fba_player.export._sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
-from fba_player.export.offscreen import Offscreen
 from fba_player.scene.scene import Scene
+from fba_player.view._camera import Camera, Subject
 from fba_player.view._font import label_font, shortened
-from fba_player.view.camera import Camera, Subject
 
 SHEETS = ("faps", "visemes", "expressions", "all", "review")
 """Names of the sheets."""

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers import move_head, read_head, read_mapping
 from fba.face.feature_points import names
 from fba.formats.gltf.moved_head import write_moved_head

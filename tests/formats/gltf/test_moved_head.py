@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers import MarkerMapping, VirtualMarker, head_of_model, move_head
 from fba.formats.gltf.moved_head import write_moved_head
 from fba.parameters import point_rows

@@ -539,7 +539,7 @@ def read_markers(path: Path) -> object:
 
 
 def _markers() -> dict[str, HostileFile]:
-    from fba.capture.markers.motion import MarkerMotion
+    from fba.capture.markers._motion import MarkerMotion
     from tools.captures.marker_files import c3d, qualisys, trc
 
     def take(markers: int, frames: int) -> MarkerMotion:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba_player.playback.timeline import BLOCK_FRAMES, Timeline
+from fba_player.playback._timeline import BLOCK_FRAMES, Timeline
 from player_tracks import body_track, face_track
 
 

@@ -14,8 +14,8 @@ from fba.face.importers.head_surface import HeadSurface, read_head_surface
 from fba.face.importers.points.points_file import read_points
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement, describe_point
+from fba_player.view._camera import Camera
 from fba_player.view._geometry import first_hit, ray_through
-from fba_player.view.camera import Camera
 
 NONE = np.full((84, 3), np.nan)
 CUBE = """v -1 -1 1

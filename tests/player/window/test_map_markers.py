@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import graphics
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers import MarkedHead, MarkerMapping, propose_mapping, read_head, read_mapping
 from fba.errors import DisplayError, OptionError
 from fba_player.scene.marker_editing import MarkerEditing

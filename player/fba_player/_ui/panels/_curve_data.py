@@ -45,7 +45,7 @@ class Course:
 class Courses:
     """Courses of the parameters of a timeline, computed when they are needed.
 
-    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds that are
+    timeline: a `Timeline`; it may grow. model: its face. later: seconds that are
     added to its times.
     """
 
