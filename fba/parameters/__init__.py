@@ -1,6 +1,5 @@
 """What the standard tabulates: FAPs, BAPs, groups, feature points and joints."""
 
-from fba.parameters._mates import fill_from_mates, mate_columns
 from fba.parameters._tables import (
     BAP_COUNT,
     BAP_GROUP_COUNT,
@@ -34,7 +33,9 @@ from fba.parameters._tables import (
     fap_steps,
     faps,
     feature_points,
+    fill_from_mates,
     joints,
+    mate_columns,
     point_rows,
 )
 

@@ -14,7 +14,7 @@ from fba.capture.blendshapes.conversion import from_blendshapes
 from fba.errors import ModelError
 from fba.face import arkit_names
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import read_table
+from fba.text_files import packaged_rows
 
 
 def from_action_units(
@@ -50,7 +50,7 @@ def to_shapes(motion: ActionUnitMotion) -> ShapeMotion:
 def unit_shapes() -> dict[int, Mapping[str, float]]:
     """Return weights of ARKit's shapes by name, for each action unit at full intensity, by its number."""
     table: dict[int, Mapping[str, float]] = {}
-    for row in read_table(__package__, "unit_shapes.csv"):
+    for row in packaged_rows(__package__, "unit_shapes.csv"):
         shapes = {}
         for entry in row["shapes"].split():
             name, _, share = entry.partition("=")

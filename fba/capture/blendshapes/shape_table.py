@@ -19,7 +19,7 @@ from fba.face.gltf.morphs import morph_values
 from fba.face.shape_names import fap_of
 from fba.name_maps import both_sides, key_of
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
-from fba.source import read_table
+from fba.text_files import packaged_rows
 
 
 @cache
@@ -57,7 +57,7 @@ def with_mates(sent: Bool) -> Bool:
 def _table() -> dict[str, Float64]:
     """Return FAPs (68,) at weight 1 by the key of each shape's name."""
     table: dict[str, Float64] = {}
-    for row in read_table(__package__, "shape_faps.csv"):
+    for row in packaged_rows(__package__, "shape_faps.csv"):
         for side, name in both_sides(row["shape"]):
             table[key_of(name)] = _amounts((row["faps"] or "").replace("?", side))
     return table

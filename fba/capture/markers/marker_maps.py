@@ -14,7 +14,8 @@ from fba.errors import FbaWarning, FormatError, ModelError, OptionError, did_you
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import change_known_names, read_names, simplify, write_names
 from fba.parameters import point_rows
-from fba.source import Path, read_table
+from fba.source import Path
+from fba.text_files import packaged_rows
 
 TABLE = "markers"
 MIN_NAMES = 8
@@ -27,7 +28,7 @@ MIN_SHARE = 0.6
 def marker_sets() -> dict[str, dict[str, str]]:
     """Return the built-in sets: name of the set -> simplified marker name -> target, "" for none."""
     result: dict[str, dict[str, str]] = {}
-    for row in read_table(__package__, "marker_sets.csv"):
+    for row in packaged_rows(__package__, "marker_sets.csv"):
         result.setdefault(row["set"], {})[simplify(row["marker"])] = row["target"]
     return result
 

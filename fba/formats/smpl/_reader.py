@@ -7,11 +7,9 @@ other files y: upright people tell.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cache
-from importlib.resources import files
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -29,6 +27,7 @@ from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.sampling import find_rate, interpolate
 from fba.source import Path, naming_file
+from fba.text_files import packaged_rows
 
 RATES = ("mocap_frame_rate", "mocap_framerate", "fps")
 PARTS = ("poses", "root_orient", "pose_body")
@@ -196,8 +195,7 @@ def _face(read_in: _Motion, at: Float64, limits: Limits) -> FaceTrack | None:
 @cache
 def _joints() -> tuple[tuple[str, str, tuple[float, float, float]], ...]:
     """Return name, parent ("" for none) and place in metres of each joint, in the order of a pose."""
-    text = (files(__package__) / "joints.csv").read_text(encoding="utf-8")
     return tuple(
         (row["joint"], row["parent"], (float(row["x"]), float(row["y"]), float(row["z"])))
-        for row in csv.DictReader(text.splitlines())
+        for row in packaged_rows(__package__, "joints.csv")
     )

@@ -6,9 +6,7 @@ points say where each vertex of its skin lies in the map. Faces whose model asks
 
 from __future__ import annotations
 
-import csv
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
@@ -16,6 +14,7 @@ from fba.arrays import Float32, Float64, Intp
 from fba.face import FaceModel, Part
 from fba.parameters import point_rows
 from fba.sampling import smoothstep
+from fba.text_files import packaged_rows
 from fba_player._mesh.wrinkle_map import WRINKLES
 
 BEGINNING_SHARE = 0.5
@@ -48,8 +47,7 @@ STIFFNESS = 1e-4
 def _table() -> tuple[Intp, Intp, Float64]:
     """Return the rows of wrinkles.csv: their wrinkles (R,), columns of their FAPs, left and right (2, R), and
     the values that bring the wrinkles out fully (R,)."""
-    with (files(__package__) / "wrinkles.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = packaged_rows(__package__, "wrinkles.csv")
     kinds = np.array([WRINKLES.index(row["wrinkle"]) for row in rows])
     columns = np.array([[int(row[side]) - 1 for row in rows] for side in ("left", "right")])
     return kinds, columns, np.array([float(row["full"]) for row in rows])

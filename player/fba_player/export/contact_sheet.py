@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -15,6 +13,7 @@ from fba.animation import Animation
 from fba.arrays import Float32, UInt8
 from fba.face import FaceModel
 from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps, point_rows
+from fba.text_files import packaged_rows
 from fba.tracks import FaceTrack
 from fba_player.export._offscreen import Offscreen
 from fba_player.export._sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
@@ -95,7 +94,7 @@ def tiles(kind: str, scene: Scene) -> list[Tile]:
 @cache
 def _fap_tiles() -> tuple[Tile, ...]:
     tiles = []
-    for row in _rows("contact_sheet.csv"):
+    for row in packaged_rows(__package__, "contact_sheet.csv"):
         number = int(row["fap"])
         faps_shown = _faps(f"{row['with']} {number}={row['value']}")
         label = f"{number} {faps()[number - 1].name}"
@@ -108,12 +107,8 @@ def _fap_tiles() -> tuple[Tile, ...]:
 def _review_tiles() -> tuple[Tile, ...]:
     return tuple(
         Tile(row["label"], "", _faps(row["faps"]), row["view"], float(row["yaw"]))
-        for row in _rows("review_sheet.csv")
+        for row in packaged_rows(__package__, "review_sheet.csv")
     )
-
-
-def _rows(name: str) -> list[dict[str, str]]:
-    return list(csv.DictReader((files(__package__) / name).read_text(encoding="utf-8").splitlines()))
 
 
 def _faps(text: str) -> Float32:
