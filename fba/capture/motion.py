@@ -12,6 +12,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64, Int64, Intp
+from fba.choices import FileUpAxis
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import FaceTrack, freeze
@@ -59,7 +60,7 @@ class SkeletonMotion:
     declared: Mapping[str, str] = field(default_factory=dict)
     axes: Float64 = field(default_factory=lambda: np.zeros((0, 4)))
     posed: bool = False
-    up: str = ""
+    up: FileUpAxis = ""
     face: Callable[[Float64], FaceTrack | None] | None = None
 
     def __post_init__(self) -> None:

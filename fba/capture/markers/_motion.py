@@ -10,6 +10,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.capture.markers._gaps import find_gaps
+from fba.choices import FileUpAxis
 from fba.errors import ModelError
 from fba.tracks import freeze
 
@@ -39,7 +40,7 @@ class MarkerMotion:
     times: Float64
     rate: Fraction
     unit: str = ""
-    up: str = ""
+    up: FileUpAxis = ""
     name: str = ""
     start: float | None = None
 

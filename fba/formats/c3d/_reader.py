@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path as FilePath
+from typing import get_args
 
 import numpy as np
 
 from fba.arrays import Array, Float64, to_float64
 from fba.capture import MarkerMotion
+from fba.choices import FileUpAxis
 from fba.errors import FbaWarning, FormatError
 from fba.formats.c3d._parameters import BLOCK_BYTES, KEY, Parameters, read_parameters
 from fba.formats.markers._rows import METRES, file_rate, unique_names, without_subject
@@ -160,8 +162,9 @@ def _units(parameters: Parameters, points: int) -> tuple[str, Float64]:
     return usual, np.array([METRES.get(word, METRES.get(usual, 0.001)) for word in words])
 
 
-def _up(parameters: Parameters) -> str:
+def _up(parameters: Parameters) -> FileUpAxis:
     """Return the axis that points up on the screen, "" if the file does not say."""
     stored = parameters.texts.get("POINT:Y_SCREEN", ("",))
     text = stored[0].lower() if stored else ""
-    return text if len(text) == 2 and text[0] in "+-" and text[1] in "xyz" else ""
+    axes: tuple[FileUpAxis, ...] = get_args(FileUpAxis)
+    return next((axis for axis in axes if axis == text), "")

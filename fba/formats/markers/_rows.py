@@ -10,6 +10,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
+from fba.choices import FileUpAxis
 from fba.errors import FbaWarning, FormatError, Remedy
 from fba.formats.text.frame_rates import Rate, parse_rate
 from fba.limits import Limits
@@ -112,7 +113,7 @@ def build_motion(
     *,
     metres: float,
     unit: str,
-    up: str,
+    up: FileUpAxis,
     name: str,
     path: Path,
     lines: list[int],

@@ -95,9 +95,9 @@ def _table() -> dict[str, Switch]:
     table: dict[str, Switch] = {}
     for row in packaged_rows(__package__, "switches.csv"):
         choices = tuple(row["choices"].split())
-        default: Value = {"flag": row["default"] == "on", "choice": row["default"], "fap": None}[row["kind"]]
+        default: dict[str, Value] = {"flag": row["default"] == "on", "choice": row["default"], "fap": None}
         shown = row["name"], row["key"], row["label"], row["kind"]
-        table[row["name"]] = Switch(*shown, default, choices, row["description"])
+        table[row["name"]] = Switch(*shown, default[row["kind"]], choices, row["description"])
     return table
 
 
