@@ -29,12 +29,11 @@ sys.path.insert(0, str(ROOT))
 from fba.capture import shape_faps  # noqa: E402
 from fba.errors import FbaError  # noqa: E402
 from fba.face import Deformer  # noqa: E402
-from fba.face.feature_points import row_of  # noqa: E402
 from fba.face.importers._gltf import gltf_pieces, locate  # noqa: E402
 from fba.face.importers.assembly._pieces import assemble, shift_piece  # noqa: E402
 from fba.face.importers.assembly.model import ImportOptions, finish_import, metres_per_unit  # noqa: E402
 from fba.face.shape_names import arkit_names, canonical_names  # noqa: E402
-from fba.parameters import FAP_COUNT, fap_numbers, faps  # noqa: E402
+from fba.parameters import FAP_COUNT, fap_numbers, faps, point_rows  # noqa: E402
 
 TABLE = ROOT / "fba/capture/blendshapes/shape_faps.csv"
 SOLVED = {
@@ -93,7 +92,7 @@ def read_head(path: Path) -> tuple[object, dict[str, np.ndarray], np.ndarray]:
     bare = [replace(piece, morphs={}) for piece in upright]
     model = finish_import(bare, points, {}, options)
     size, _ = metres_per_unit(points)
-    pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
+    pupils = points[[point_rows()["3.5"], point_rows()["3.6"]]]
     placed = [
         shift_piece(piece, size, -pupils.mean(axis=0) * size)
         for piece in assemble(upright, None, middle=float(pupils[:, 0].mean()))
