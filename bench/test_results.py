@@ -141,9 +141,9 @@ def test_validation(
 def test_sound_clock(benchmark: Any, tmp_path: Path, report: Callable[[str], None]) -> None:
     """A null device takes samples by the wall clock: the clock of the sound must keep a constant distance."""
     pytest.importorskip("miniaudio")
-    from fba_player.playback.timeline import Timeline
-    from fba_player.playback.transport import Transport
-    from fba_player.sound.player import Audio
+    from fba_player.playback._timeline import Timeline
+    from fba_player.playback._transport import Transport
+    from fba_player.sound._player import Audio
 
     rate = 48_000
     path = tmp_path / "tone.wav"

@@ -9,12 +9,12 @@ from PIL import Image, ImageDraw
 
 from fba import Animation, FaceTrack, emotion
 from fba.arrays import Float32
+from fba_player.export._offscreen import Offscreen
 from fba_player.export._sheet_layout import FAINT, PAPER, TEXT, lay_out
 from fba_player.export.contact_sheet import close_up
-from fba_player.export.offscreen import Offscreen
 from fba_player.scene.scene import Scene
+from fba_player.view._camera import Camera
 from fba_player.view._font import label_font
-from fba_player.view.camera import Camera
 
 YAW = 10.0
 """Degrees: a head turned a little shows brows and cheeks better, and what is one-sided."""

@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 
 from fba import player
 from fba.capture import ShapeMotion, from_blendshapes
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER
+from fba.face import arkit_names
 
 TARGET = Path(__file__).with_name("images") / "capture-faces.jpg"
 SIZE = (200, 230)
@@ -33,11 +33,11 @@ POSES = (
 
 def main() -> None:
     """Draw the built-in head with a few of ARKit's shapes, and their names."""
-    weights = np.zeros((len(POSES), len(ARKIT_ORDER)))
+    weights = np.zeros((len(POSES), len(arkit_names())))
     for row, pose in enumerate(POSES):
         for name, weight in pose.items():
-            weights[row, ARKIT_ORDER.index(name)] = weight
-    motion = ShapeMotion(ARKIT_ORDER, weights, np.arange(len(POSES)) / 25, Fraction(25))
+            weights[row, arkit_names().index(name)] = weight
+    motion = ShapeMotion(arkit_names(), weights, np.arange(len(POSES)) / 25, Fraction(25))
     sheet = Image.new("RGB", (COLUMNS * SIZE[0], len(POSES) // COLUMNS * SIZE[1]))
     draw = ImageDraw.Draw(sheet)
     with player.Offscreen(from_blendshapes(motion), SIZE, camera="front", samples=4) as view:

@@ -9,7 +9,7 @@ from PIL import Image
 
 from fba import player
 from fba.body import gait
-from fba_player.view.camera import Camera
+from fba_player.view._camera import Camera
 
 TARGET = Path(__file__).with_name("images") / "gait.jpg"
 PHASES = 8

@@ -14,7 +14,7 @@ import fba
 from fba.capture import MarkerMotion, from_markers
 from fba.capture.virtual_markers import propose_mapping, read_head
 from fba.formats import read_face
-from fba_player.export.offscreen import Offscreen
+from fba_player.export._offscreen import Offscreen
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.markers_scene import MarkersScene
 from fba_player.scene.scene import Scene

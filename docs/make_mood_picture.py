@@ -9,7 +9,7 @@ import numpy as np
 import fba
 from fba.arrays import UInt8
 from fba.emotion import Mood, emote
-from fba_player.export.offscreen import Offscreen
+from fba_player.export._offscreen import Offscreen
 from fba_player.scene.scene import Scene
 
 SAMPLE = Path(fba.__file__).with_name("samples") / "hello.fap"

@@ -21,9 +21,9 @@ from fba_player.scene._point_placement import PointPlacement
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.markers_scene import MarkersScene
 from fba_player.scene.scene import Scene
+from fba_player.session._puppet import Expression
 from fba_player.session._session import Session
 from fba_player.session._source import Source
-from fba_player.session.puppet import Expression
 from tools.window_picture import SETTLES, Studio, picture
 
 SAMPLES = Path(fba.__file__).resolve().with_name("samples")

@@ -14,6 +14,8 @@ UpAxis = Literal["y", "z"]
 """The axis of a mesh that points up."""
 SignedUpAxis = Literal["auto", "+x", "-x", "+y", "-y", "+z", "-z"]
 """The axis of a motion that points up; "auto": detected."""
+FileUpAxis = Literal["", "+x", "-x", "+y", "-y", "+z", "-z"]
+"""The axis that a file says is up; "" where it says none."""
 Swap = Literal["auto", "yes", "no"]
 """Whether MouthLeft and MouthRight, JawLeft and JawRight of a table change places."""
 Gaze = Literal["none", "camera"]

@@ -110,6 +110,11 @@ def simplify(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
 
 
+def key_of(name: str) -> str:
+    """Return the letters and digits of a name, in lower case."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
 def both_sides(text: str) -> list[tuple[str, str]]:
     """Return ("l", "LeftArm") and ("r", "RightArm") for "(Left|Right)Arm"; ("", text) without sides."""
     sides = re.search(r"\((\w+)\|(\w+)\)", text)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.resources import files
 from typing import BinaryIO
 
 from fba.errors import (
@@ -109,9 +107,3 @@ def naming_file(path: Path) -> Iterator[None]:
         if not error.finding.startswith(f"{name}: "):
             error.args = (f"{name}: {error.finding}",)
         raise
-
-
-def read_table(package: str, name: str) -> list[dict[str, str]]:
-    """Return the rows of a CSV file that a package of ours ships."""
-    text = (files(package) / name).read_text(encoding="utf-8")
-    return list(csv.DictReader(text.splitlines()))

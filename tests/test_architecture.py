@@ -53,7 +53,7 @@ fba.face.importers.points
 fba.face.importers.makehuman
 fba.face.importers
 fba.face.calibration
-fba.body.skeleton
+fba.body._skeleton
 fba.body.solve
 fba.body.skin
 fba.body
@@ -66,7 +66,6 @@ fba.planning._encoding
 fba.capture.markers
 fba.capture.virtual_markers
 fba.capture.motion
-fba.capture.sampling
 fba.capture._limbs
 fba.capture.comparison
 fba.capture.blendshapes
@@ -134,8 +133,8 @@ FACADES = {
     ("fba.cli.main", "fba.cli.commands.*"): "the subcommands by name",
     ("fba.face.model", "fba.face.gltf._storage"): "`FaceModel.load` and `save`",
     ("fba.face.model", "fba.face.builtin"): "`FaceModel.default`",
-    ("fba.body.model", "fba.body._storage"): "`BodyModel.load` and `save`",
-    ("fba.body.model", "fba.body.builtin"): "`BodyModel.default`",
+    ("fba.body._model", "fba.body._storage"): "`BodyModel.load` and `save`",
+    ("fba.body._model", "fba.body.builtin"): "`BodyModel.default`",
 }
 """Imports that may point up, and why."""
 

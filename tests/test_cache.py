@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.body.skin._moving_normals import normal_rings
 from fba.cache import MAX_FILES, load_or_make, make_key
 

@@ -26,15 +26,14 @@ from scipy.optimize import lsq_linear
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from fba.capture.blendshapes.shape_table import amounts_of  # noqa: E402
+from fba.capture import shape_faps  # noqa: E402
 from fba.errors import FbaError  # noqa: E402
 from fba.face import Deformer  # noqa: E402
-from fba.face.feature_points import row_of  # noqa: E402
 from fba.face.importers._gltf import gltf_pieces, locate  # noqa: E402
 from fba.face.importers.assembly._pieces import assemble, shift_piece  # noqa: E402
 from fba.face.importers.assembly.model import ImportOptions, finish_import, metres_per_unit  # noqa: E402
 from fba.face.shape_names import arkit_names, canonical_names  # noqa: E402
-from fba.parameters import FAP_COUNT, fap_numbers, faps  # noqa: E402
+from fba.parameters import FAP_COUNT, fap_numbers, faps, point_rows  # noqa: E402
 
 TABLE = ROOT / "fba/capture/blendshapes/shape_faps.csv"
 SOLVED = {
@@ -93,7 +92,7 @@ def read_head(path: Path) -> tuple[object, dict[str, np.ndarray], np.ndarray]:
     bare = [replace(piece, morphs={}) for piece in upright]
     model = finish_import(bare, points, {}, options)
     size, _ = metres_per_unit(points)
-    pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
+    pupils = points[[point_rows()["3.5"], point_rows()["3.6"]]]
     placed = [
         shift_piece(piece, size, -pupils.mean(axis=0) * size)
         for piece in assemble(upright, None, middle=float(pupils[:, 0].mean()))
@@ -195,7 +194,7 @@ def touch(row: str, medians: dict[str, np.ndarray]) -> None:
     """Make lids that close and lips that are brought together touch, and no more."""
     values = medians[row]
     if "Look" in row:
-        before = amounts_of(row.split("(", maxsplit=1)[0] + "Left" if "(" in row else row)
+        before = shape_faps(row.split("(", maxsplit=1)[0] + "Left" if "(" in row else row)
         eyes = [fap.number - 1 for fap in faps() if fap.name.startswith(("yaw", "pitch"))]
         values[eyes] = np.sign(before[eyes]) * [MEASURED[faps()[eye].name.split("_")[0]] for eye in eyes]
     if row.startswith("eyeBlink"):
@@ -282,7 +281,7 @@ def main() -> None:
         touch(row, medians)
         correct(row, median)
         share = np.median([one for name in names for one in shares.get(name, [])])
-        set_before = amounts_of(names[0])
+        set_before = shape_faps(names[0])
         lines[row] = as_text(median, len(names) > 1)
         print(f"\n{row}: {share:.0%} of the motion")
         print("  before ", as_text(set_before, len(names) > 1))

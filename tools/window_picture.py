@@ -13,7 +13,7 @@ import numpy as np
 from fba.arrays import UInt8
 from fba_player.gl._context import offscreen_context
 from fba_player.gl._framebuffer import Target
-from fba_player.gl.renderer import Renderer
+from fba_player.gl._renderer import Renderer
 from fba_player.session._session import Session
 
 if TYPE_CHECKING:

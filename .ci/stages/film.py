@@ -7,7 +7,7 @@ import wave
 import av
 import numpy as np
 
-from fba_player.export.recorder import Recorder
+from fba_player.export._recorder import Recorder
 
 RATE = 44100
 with wave.open("tone.wav", "wb") as file:

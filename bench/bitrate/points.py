@@ -14,8 +14,7 @@ from bench.bitrate.subjects import BODY, FACE, Subject
 from fba.arrays import Float64, Int64
 from fba.codec import EncoderOptions, decode, encode_animation, probe_stream
 from fba.encoder_options import PlannedPreset
-from fba.face import resolve
-from fba.face.resolve import known_faps
+from fba.face import known_faps, resolve
 from fba.planning import LiveEncoder, Tolerance, encode_planned, encode_within_tolerance, plan_compact
 from fba.planning.rate import RateEncoder
 

@@ -12,18 +12,18 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from fba.arrays import Float64, Int64
-from fba.body.skeleton import MAX_JOINTS, Skeleton
+from fba.body._skeleton import MAX_JOINTS, Skeleton
 from fba.errors import ModelError
 from fba.source import Path, read_whole
 
 MAX_BYTES = 1 << 24
 """Largest file of a definition: 4096 joints take less than 1 MB."""
-PROFILES = ("simple", "calibration", "predictable")
+Profile = Literal["simple", "calibration", "predictable"]
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ class BodyDefinition:
             raise ModelError(f"{file}: a parent must be the name of a joint, or null for the root")
         return cls({name: joint["centre"] for name, joint in joints.items()}, parents)
 
-    def skeleton(self, profile: str = "calibration", generic: Skeleton | None = None) -> Skeleton:
+    def skeleton(self, profile: Profile = "calibration", generic: Skeleton | None = None) -> Skeleton:
         """Return the skeleton that a decoder of this profile moves.
 
-        profile: one of `PROFILES`. generic: the decoder's body, by default the built-in one. Raises
+        profile: a `Profile`. generic: the decoder's body, by default the built-in one. Raises
         ModelError for "predictable" if parents are missing or contradict each other.
         """
-        if profile not in PROFILES:
-            raise ValueError(f"profile must be one of {', '.join(PROFILES)}, not {profile!r}")
+        if profile not in get_args(Profile):
+            raise ValueError(f"profile must be one of {', '.join(get_args(Profile))}, not {profile!r}")
         generic = generic if generic is not None else Skeleton.default()
         if profile == "simple":
             return generic

@@ -14,8 +14,8 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.model import BODY_PART_KINDS, BodyModel, BodyPart
-from fba.body.skeleton import MAX_JOINTS, Skeleton
+from fba.body._model import BODY_PART_KINDS, BodyModel, BodyPart
+from fba.body._skeleton import MAX_JOINTS, Skeleton
 from fba.body.skin.skin_weights import INFLUENCES
 from fba.errors import ModelError
 from fba.gltf import (

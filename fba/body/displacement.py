@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32
-from fba.body.skeleton import SIDES, Skeleton
+from fba.body._skeleton import SIDES, Skeleton
 from fba.body.solve.solver import BapSolver
 from fba.body.stance import find_stance, sole_points
 

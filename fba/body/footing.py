@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64
-from fba.body.skeleton import SIDES, Skeleton
+from fba.body._skeleton import SIDES, Skeleton
 from fba.body.solve.solver import BapSolver
 from fba.choices import Axes
 

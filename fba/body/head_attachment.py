@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Array, Bool, Float32, Float64, Int32, Int64
-from fba.body.model import BodyModel, BodyPart
+from fba.body._model import BodyModel, BodyPart
 from fba.body.skin._skinning import Skinner, build_skinner
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights, strongest_weights
 from fba.cache import load_or_make, make_key
 from fba.choices import SkinMethod
-from fba.easing import smoothstep
 from fba.errors import ModelError
 from fba.mesh import checked_rows, connected
+from fba.sampling import smoothstep
 
 SKULL = "skullbase"
 """The joint that carries the head, and that FAP 48 to 50 turn it on (ISO/IEC 14496-2, annex C)."""

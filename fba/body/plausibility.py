@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from fba.arrays import Bool, Float64, Int64
 from fba.body._round_angles import find_rounder_table
-from fba.body.skeleton import Skeleton
+from fba.body._skeleton import Skeleton
 from fba.body.solve._pose_loops import MILLIMETRE, UNIT
 from fba.body.solve.conventions import NO_BAP, convention
 from fba.body.solve.limits import DEGREES, FULL_TURN, widest_limits

@@ -8,8 +8,8 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.body import ground
+from fba.body._skeleton import SIDES, Skeleton
 from fba.body.footing import FOOT, SOLE, foot_frames, lowest_edge
-from fba.body.skeleton import SIDES, Skeleton
 
 HEEL = 0.045
 """Metres from an ankle back to the heel."""

@@ -7,18 +7,19 @@ May use: parameters, face and body, and the modules of `fba` itself.
 from fba.capture._conversion import FaceCapture, capture_options, make_animation
 from fba.capture._report import BoneError, FeetError, RetargetReport, measure_bones, retarget_report
 from fba.capture._retarget import SkeletonOptions
+from fba.capture._skeleton import Captured, from_skeleton, retarget_motion
 from fba.capture.blendshapes import (
     ActionUnitMotion,
     ShapeMotion,
     from_action_units,
     from_blendshapes,
+    shape_faps,
     to_blendshapes,
 )
 from fba.capture.markers._faces import from_markers
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion
 from fba.capture.points import PointMotion, from_points
-from fba.capture.skeleton import Captured, from_skeleton, retarget_motion
 
 __all__ = [
     "ActionUnitMotion",
@@ -42,5 +43,6 @@ __all__ = [
     "measure_bones",
     "retarget_motion",
     "retarget_report",
+    "shape_faps",
     "to_blendshapes",
 ]

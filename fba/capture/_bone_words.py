@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from functools import cache
 
-from fba.source import read_table
+from fba.text_files import packaged_rows
 
 MAX_NAME_LENGTH = 200
 """Largest number of characters of a name that are read, from its end."""
@@ -47,7 +47,7 @@ class Meaning:
 @cache
 def _words() -> dict[str, tuple[str, ...]]:
     """Return word -> what it means."""
-    return {row["word"]: tuple(row["means"].split()) for row in read_table(__package__, "bone_words.csv")}
+    return {row["word"]: tuple(row["means"].split()) for row in packaged_rows(__package__, "bone_words.csv")}
 
 
 def read(name: str) -> Meaning:

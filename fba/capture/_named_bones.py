@@ -13,8 +13,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from fba.arrays import Float64, Int64
-from fba.body import Skeleton
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, Skeleton
 from fba.capture._bone_words import Meaning, read
 from fba.capture._spine import heights as spine_heights
 from fba.capture._spine import joints as spine_joints

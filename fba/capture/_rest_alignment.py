@@ -20,7 +20,7 @@ from fba.body import Skeleton
 from fba.capture._spine import joints as spine_joints
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError
-from fba.source import read_table
+from fba.text_files import packaged_rows
 
 MIN_BONE_LENGTH = 1e-6
 """Smallest length of a bone that has a direction, as a share of the skeleton's size."""
@@ -51,7 +51,7 @@ def bones() -> tuple[Bone, ...]:
     rows = [
         {key: text.replace("?", side) for key, text in row.items()}
         for side in "lr"
-        for row in read_table(__package__, "bones.csv")
+        for row in packaged_rows(__package__, "bones.csv")
     ]
     return tuple(
         Bone(row["joint"], row["base"], tuple(row["aims"].split()), row["tip"], row["via"]) for row in rows

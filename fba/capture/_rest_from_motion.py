@@ -16,8 +16,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64, Intp
-from fba.body import Skeleton
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, Skeleton
 from fba.capture import _standing as standing
 from fba.capture._named_bones import FINGERS
 from fba.capture._rest_alignment import bones

@@ -12,8 +12,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
-from fba.body import BapSolver
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, BapSolver
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _spine as spine
 from fba.capture._limbs import bone_ik, hinges

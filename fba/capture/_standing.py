@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.body.skeleton import ROOT
+from fba.body import ROOT
 from fba.rotations import degrees_between, unit
 
 MAX_ANGLES = {

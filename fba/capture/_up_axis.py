@@ -13,21 +13,23 @@ from fba.capture import _standing as standing
 from fba.capture.motion import SAMPLE_FRAMES, SkeletonMotion, read_axis
 
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
-MIN_UP_LENGTH = 0.75
-"""Smallest length of the mean of upright directions, 0 to 1, with which the motion shows which axis is up."""
-MAX_FLOOR_DISTANCE = 0.06
-"""Share of a body's height within which joints above the lowest touch the floor."""
-MAX_REST_SPEED = 0.2
-"""Largest speed of a joint at rest, in heights of the body per second."""
-REST_INTERVAL = 0.1
-"""Seconds between the two moments whose comparison shows whether a joint rests."""
-MAX_OFF_CENTRE = 0.15
-"""Largest horizontal distance of a body's middle from the joints that carry it, in heights of the body."""
-MIN_CARRIED_SHARE = 0.4
-"""Smallest share of frames in which joints rest on a floor, if there is one."""
 TRUNK = ("l_hip", "r_hip", "l_shoulder", "r_shoulder")
-LEG_SHARE = 0.5
-"""Share of a body's height that a leg takes."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the search for the axis that points up."""
+
+    min_up_length: float = 0.75  # length of the mean of upright directions, 0 to 1, that is clear
+    max_floor_distance: float = 0.06  # share of a body's height within which joints are on the floor
+    max_rest_speed: float = 0.2  # speed of a joint at rest, in heights of the body per second
+    rest_interval: float = 0.1  # seconds between the two moments whose comparison shows whether a joint rests
+    max_off_centre: float = 0.15  # of a body's middle from the joints that carry it, in its heights
+    min_carried_share: float = 0.4  # share of frames in which joints rest on a floor, if there is one
+    leg_share: float = 0.5  # share of a body's height that a leg takes
+
+
+TUNING = Tuning()
 
 
 @dataclass(frozen=True)
@@ -86,12 +88,12 @@ def find_up_axis(
     axis = nearest_axis(mean)
     clear = float(mean @ axis)
     stands = bool((stance.angles.get("thigh", np.zeros(1)) <= standing.MAX_ANGLES["thigh"]).any())
-    upright = stands and clear >= MIN_UP_LENGTH
+    upright = stands and clear >= TUNING.min_up_length
     trunk = _name(axis)
     if not bool(at_rest.possible[0]):
         return _find_freely(motion, mapped, trunk, clear, stands)
     rest_axis = _name(nearest_axis(at_rest.up[0]))
-    if rest_axis == trunk and clear >= MIN_UP_LENGTH:
+    if rest_axis == trunk and clear >= TUNING.min_up_length:
         reason = f"{rest_axis}: people stand along it, as in the rest pose ({100 * clear:.0f} %)"
         return Up(rest_axis, max(clear, 0.8), reason)
     moments = _find_moments(motion)
@@ -99,7 +101,7 @@ def find_up_axis(
     stood = upright and floors[trunk].carries
     if floors[rest_axis].carries or (floors[rest_axis].touched and not stood):
         doubt = ""
-        if trunk != rest_axis and clear >= MIN_UP_LENGTH and floors[trunk].touched:
+        if trunk != rest_axis and clear >= TUNING.min_up_length and floors[trunk].touched:
             doubt = f"joints rest on a floor along it, as in the rest pose, but trunks point along {trunk}"
         return Up(
             rest_axis, 0.8, f"{rest_axis}, as in the rest pose: joints rest on a floor along it", doubt, trunk
@@ -127,14 +129,14 @@ def _find_freely(
     """
     if not stands and trunk[1] == "x":
         return Up(trunk, 0.4, f"perhaps {trunk}: trunks point along it, but nobody ever stands")
-    first = [trunk] if clear >= MIN_UP_LENGTH and trunk in ("+y", "+z") else []
+    first = [trunk] if clear >= TUNING.min_up_length and trunk in ("+y", "+z") else []
     moments = _find_moments(motion)
     floors = {name: _find_floor(moments, mapped, name) for name in {"+y", "+z", trunk}}
     floor_axis = next((name for name in (*first, "+y", "+z") if floors[name].touched), trunk)
     if floor_axis != trunk:
         doubt = f"joints rest on a floor along it, but trunks point along {trunk}, and nobody can rest so"
         return Up(floor_axis, 0.6, f"{floor_axis}: joints rest on a floor along it", doubt, trunk)
-    if clear < MIN_UP_LENGTH:
+    if clear < TUNING.min_up_length:
         return Up(trunk, clear * 0.6, f"perhaps {trunk}: the body is upright for little of the time")
     doubt = ""
     if trunk != "+y" and floors["+y"].carries:
@@ -146,7 +148,7 @@ def _find_freely(
 
 def _find_moments(motion: SkeletonMotion) -> _Moments:
     """Return where joints are in some frames, and a little later."""
-    step = max(1, round(REST_INTERVAL * motion.rate))
+    step = max(1, round(TUNING.rest_interval * motion.rate))
     last = max(len(motion) - 1 - step, 0)
     rows = np.unique(np.linspace(0, last, min(last + 1, SAMPLE_FRAMES)).astype(np.intp))
     later = np.minimum(rows + step, len(motion) - 1)
@@ -164,16 +166,19 @@ def _find_floor(moments: _Moments, mapped: Mapping[str, int], up: str) -> _Floor
     heights = places[:, joints] @ axis
     level = float(np.percentile(heights.min(axis=1), 10))
     moved = np.linalg.norm(moments.later[:, joints] - places[:, joints], axis=2)
-    rests = (heights < level + MAX_FLOOR_DISTANCE * size) & (moved < MAX_REST_SPEED * size * moments.seconds)
+    rests = (heights < level + TUNING.max_floor_distance * size) & (
+        moved < TUNING.max_rest_speed * size * moments.seconds
+    )
     touched = rests.any(axis=1)
     middle = [joints.index(mapped[name]) for name in TRUNK if name in mapped] or list(range(len(joints)))
     flat = places[:, joints] * (1 - np.abs(axis))
     centre = flat[:, middle].mean(axis=1)
     ends = [np.where(rests[..., None], flat, -sign * np.inf) for sign in (1, -1)]
-    room = MAX_OFF_CENTRE * size
+    room = TUNING.max_off_centre * size
     above = ((centre < ends[0].max(axis=1) + room) & (centre > ends[1].min(axis=1) - room)).all(axis=1)
     return _Floor(
-        float(touched.mean()) >= MIN_CARRIED_SHARE, float((touched & above).mean()) >= MIN_CARRIED_SHARE
+        float(touched.mean()) >= TUNING.min_carried_share,
+        float((touched & above).mean()) >= TUNING.min_carried_share,
     )
 
 
@@ -183,7 +188,7 @@ def _height(places: Float64, mapped: Mapping[str, int]) -> float:
         chain = [mapped.get(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")]
         if None not in chain:
             bones = np.diff(places[0, [joint for joint in chain if joint is not None]], axis=0)
-            return float(np.linalg.norm(bones, axis=1).sum()) / LEG_SHARE
+            return float(np.linalg.norm(bones, axis=1).sum()) / TUNING.leg_share
     return float(np.ptp(places, axis=1).max())
 
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.body import Skeleton
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, Skeleton
 from fba.capture import _named_bones as named_bones
 from fba.capture import matching
 from fba.capture.motion import SkeletonMotion

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fba.body import Skeleton
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, Skeleton
 from fba.capture.bones import find_bones
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FormatError, ModelError, OptionError, did_you_mean

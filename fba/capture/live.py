@@ -16,15 +16,16 @@ from fba.animation import Animation
 from fba.arrays import Float64, Int32
 from fba.body import BapSolver
 from fba.capture import _retarget as retarget
+from fba.capture._skeleton import solve_targets
 from fba.capture.blendshapes.combination import RADIAN
 from fba.capture.blendshapes.conversion import EYE_FAPS, HEAD_FAPS, convert_rows
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of, largest_amounts
+from fba.capture.blendshapes.shape_table import largest_amounts, shape_faps
 from fba.capture.motion import SkeletonMotion
 from fba.capture.preparation import prepare, rest_on_frame
-from fba.capture.sampling import TIME_TOLERANCE, interpolate
-from fba.capture.skeleton import solve_targets
+from fba.face import arkit_names
 from fba.limits import DEFAULT_LIMITS
 from fba.parameters import FAP_COUNT, fap_numbers
+from fba.sampling import TIME_TOLERANCE, interpolate
 from fba.tracks import BodyTrack, FaceTrack
 
 __all__ = ["LiveBlendshapes", "LiveSkeleton", "widest_faces"]
@@ -45,7 +46,7 @@ def widest_faces() -> Animation:
 
     Heads and eyes turn by a radian each way. For `fba.codec.Encoder.expect`.
     """
-    shapes = np.array([amounts for name in ARKIT_ORDER if (amounts := amounts_of(name)) is not None])
+    shapes = np.array([amounts for name in arkit_names() if (amounts := shape_faps(name)) is not None])
     most = np.maximum(np.maximum(shapes, 0.0).sum(axis=0), largest_amounts())
     least = np.minimum(np.minimum(shapes, 0.0).sum(axis=0), -largest_amounts())
     turns = [fap_numbers()[name] - 1 for name in (*HEAD_FAPS, *EYE_FAPS)]

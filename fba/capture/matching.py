@@ -12,12 +12,11 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import islice
 
-from fba.body import Skeleton
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, Skeleton
 from fba.errors import ModelError, Remedy
 from fba.name_maps import both_sides, simplify
 from fba.parameters import joints
-from fba.source import read_table
+from fba.text_files import packaged_rows
 
 MIN_NAMES = 5
 """Smallest number of names by which a family fits."""
@@ -36,7 +35,7 @@ GIVE_JOINTS = Remedy(
 def families() -> dict[str, dict[str, str]]:
     """Return by family: simplified source name -> joint of the standard."""
     result: dict[str, dict[str, str]] = {}
-    for row in read_table(__package__, "joint_names.csv"):
+    for row in packaged_rows(__package__, "joint_names.csv"):
         family = result.setdefault(row["family"], {})
         for side, source in both_sides(row["source"]):
             family[simplify(source)] = row["joint"].replace("?", side)

@@ -6,17 +6,23 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64, Int64, Intp
+from fba.choices import FileUpAxis
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import FaceTrack, freeze
 
 SAMPLE_FRAMES = 400
 """Number of frames, spread evenly, that are examined in place of a whole motion."""
+FRAME_BYTES = 2400
+"""Memory, in bytes, that retargeting takes for each frame."""
+JOINT_BYTES = 130
+"""Memory, in bytes, that retargeting takes for each joint of the source in a frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +45,9 @@ class SkeletonMotion:
     Raises ModelError if the parts contradict each other or are not finite.
     """
 
+    MAX_FRAMES: ClassVar = 500_000
+    """Frames of the longest motion: more than an hour at 120 frames/s."""
+
     names: tuple[str, ...]
     parents: Int64
     offsets: Float64
@@ -51,7 +60,7 @@ class SkeletonMotion:
     declared: Mapping[str, str] = field(default_factory=dict)
     axes: Float64 = field(default_factory=lambda: np.zeros((0, 4)))
     posed: bool = False
-    up: str = ""
+    up: FileUpAxis = ""
     face: Callable[[Float64], FaceTrack | None] | None = None
 
     def __post_init__(self) -> None:
@@ -84,6 +93,15 @@ class SkeletonMotion:
             raise ModelError("SkeletonMotion: an end hangs on a joint that is not there")
         if frames and np.abs(np.linalg.norm(self.rotations, axis=-1) - 1).max(initial=0.0) > 1e-6:
             raise ModelError("SkeletonMotion: rotations must be unit quaternions")
+
+    @staticmethod
+    def check_memory(limits: Limits, frames: int, joints: int, what: str, source: int) -> None:
+        """Raise LimitError if the retargeting of a motion would take more than the limits allow.
+
+        what: "the motion". source: bytes of the file, or the part of it, that the motion comes from.
+        """
+        limits.check_frames(frames, what)
+        limits.check_bytes(frames * (FRAME_BYTES + JOINT_BYTES * joints), what, source=source)
 
     def __len__(self) -> int:
         return len(self.positions)

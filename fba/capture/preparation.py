@@ -14,8 +14,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64
-from fba.body import Skeleton
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, Skeleton
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _standing as standing
 from fba.capture import matching

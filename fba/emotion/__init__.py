@@ -5,6 +5,8 @@ several, `expression_at` returns the expression at an activation and evaluation,
 `Animation`.
 """
 
+from fba.emotion._expression import FAMILIES, NEUTRAL_POINT, Expression
+from fba.emotion._expressions import expression, expressions
 from fba.emotion._modification import Damping, emote, modify
 from fba.emotion._moods import Mood, MoodCurve
 from fba.emotion._performance import animate
@@ -12,8 +14,6 @@ from fba.emotion._profiles import Measurement, Movement, measured_faps, measurem
 from fba.emotion._reading import Readings, read_expressions
 from fba.emotion._rules import Rules
 from fba.emotion.blending import Blend, combine, parse_weights
-from fba.emotion.expression import FAMILIES, NEUTRAL_POINT, Expression
-from fba.emotion.expressions import expression, expressions
 from fba.emotion.plane import expression_at, known_points
 from fba.emotion.recogniser import ExpressionRecogniser, Nearest, Reading
 

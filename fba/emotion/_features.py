@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.parameters import FAP_COUNT, fap_numbers
+from fba.text_files import packaged_rows
 
 UPPER_LID_PER_GAZE = 0.0089
 """Motion of an upper lid that follows the gaze, IRISD per 1e-5 rad of pitch."""
@@ -37,8 +36,7 @@ class Features:
 @cache
 def features() -> Features:
     """Return the table `features.csv`."""
-    with (files(__package__) / "features.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = packaged_rows(__package__, "features.csv")
     weights = np.zeros((len(rows), FAP_COUNT))
     for number, row in enumerate(rows):
         pairs = [pair.partition("=") for pair in row["faps"].split()]

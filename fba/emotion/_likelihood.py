@@ -9,22 +9,21 @@ expressions. Speakers raise the brows to stress a word: `model` counts that as n
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
 from fba.capture.blendshapes.action_units import unit_shapes
+from fba.emotion._expression import FAMILIES
+from fba.emotion._expressions import expressions
 from fba.emotion._features import features, known_features, measure
 from fba.emotion._profiles import measured_faps, measurements
-from fba.emotion.expression import FAMILIES
-from fba.emotion.expressions import expressions
 from fba.face import Definitions, resolve
 from fba.parameters import FAP_COUNT, fap_numbers
+from fba.text_files import packaged_rows
 
 INTENSITIES = (0.3, 0.42, 0.56, 0.7, 0.85, 1.0, 1.25)
 """Intensities at which each expression is tried."""
@@ -149,18 +148,17 @@ def _prototypes(family: str) -> list[tuple[Float64, Float64]]:
     """Return the FAPs of each of a family's sets of action units, and the directions in which they vary."""
     units = _unit_faps()
     result = []
-    with (files(__package__) / "prototypes.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            if row["family"] == family:
-                pairs = [pair.split("=") for pair in row["units"].split()]
-                weights = {int(unit): float(weight) for unit, weight in pairs}
-                scale = 1 / max(weights.values())
-                faps = sum(scale * weight * units[unit] for unit, weight in weights.items())
-                directions = [
-                    scale * max(SPREADS.unit * weight, SPREADS.min_unit) * units[unit]
-                    for unit, weight in weights.items()
-                ]
-                result.append((np.asarray(faps), np.array(directions)))
+    for row in packaged_rows(__package__, "prototypes.csv"):
+        if row["family"] == family:
+            pairs = [pair.split("=") for pair in row["units"].split()]
+            weights = {int(unit): float(weight) for unit, weight in pairs}
+            scale = 1 / max(weights.values())
+            faps = sum(scale * weight * units[unit] for unit, weight in weights.items())
+            directions = [
+                scale * max(SPREADS.unit * weight, SPREADS.min_unit) * units[unit]
+                for unit, weight in weights.items()
+            ]
+            result.append((np.asarray(faps), np.array(directions)))
     return result
 
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Float32, Float64
+from fba.emotion._expression import NEUTRAL_POINT, Expression, whissel_points
 from fba.emotion._rules import Part, Rules, limited, mix_families, mix_within_family, part
-from fba.emotion.expression import NEUTRAL_POINT, Expression, whissel_points
 from fba.face import Definitions
 from fba.parameters import EXPRESSIONS, FAP_COUNT
 

@@ -15,16 +15,14 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32
-from fba.easing import smoothstep
+from fba.emotion._expressions import expressions
 from fba.emotion._moods import Mood, MoodCurve, check_spans, intensity_curves
 from fba.emotion._rules import Rules, limited
 from fba.emotion.blending import combine
-from fba.emotion.expressions import expressions
 from fba.errors import OptionError
-from fba.face import Definitions, resolve
-from fba.face.mates import fill
-from fba.face.resolve import FaceSettings
-from fba.parameters import FAP_COUNT, fap_numbers
+from fba.face import Definitions, FaceSettings, resolve
+from fba.parameters import FAP_COUNT, fap_numbers, fill_from_mates
+from fba.sampling import smoothstep
 from fba.tracks import FaceTrack
 
 LIDS_APART = 1024.0
@@ -223,6 +221,6 @@ def _face(face: FaceTrack, values: Int32, moved: Bool) -> FaceTrack:
     """Return a track that sends, in every frame, the FAPs of the source, those of moods, and their mates."""
     sent = face.mask.any(axis=0) | moved | (values != 0).any(axis=0)
     sent[:2] = False
-    copies = fill(values[0], sent)[1]
+    copies = fill_from_mates(values[0], sent)[1]
     copies[:2] = False
     return FaceTrack(values, np.broadcast_to(copies, values.shape))

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64
-from fba.easing import smoothstep
+from fba.emotion._expressions import expression
 from fba.emotion.blending import MAX_INTENSITY, NEUTRAL
-from fba.emotion.expressions import expression
 from fba.errors import OptionError
+from fba.sampling import smoothstep
 
 
 @dataclass(frozen=True)

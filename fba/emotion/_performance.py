@@ -11,11 +11,10 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64, Int16
 from fba.choices import Sending
-from fba.easing import smoothstep
 from fba.emotion.blending import Blend
 from fba.errors import OptionError
-from fba.face.mates import fill
-from fba.parameters import FIRST_LOW_LEVEL_FAP
+from fba.parameters import FIRST_LOW_LEVEL_FAP, fill_from_mates
+from fba.sampling import smoothstep
 from fba.tracks import FaceTrack
 
 SENDING: tuple[Sending, ...] = get_args(Sending)
@@ -82,6 +81,6 @@ def _by_faps(blend: Blend, strength: Float64) -> FaceTrack:
     """Return a track of the FAPs that move, and those that would otherwise copy one of them."""
     values = np.rint(strength[:, None].astype(np.float32) * blend.faps).astype(np.int32)
     moving = blend.faps != 0
-    copies = fill(blend.faps, moving)[1]
+    copies = fill_from_mates(blend.faps, moving)[1]
     copies[: FIRST_LOW_LEVEL_FAP - 1] = False
     return FaceTrack(values, np.broadcast_to(copies, values.shape))

@@ -6,17 +6,16 @@ values are changes of distances on a face, in FAPU; `sign` converts them to FAPs
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Float32
-from fba.emotion.expression import FAMILIES
+from fba.emotion._expression import FAMILIES
 from fba.errors import OptionError, did_you_mean
 from fba.parameters import FAP_COUNT, fap_numbers
+from fba.text_files import packaged_rows
 
 UPPER_LID_SHARE = 0.7
 """Share of the upper lid in a change of the eye's opening; the source measured only the opening."""
@@ -114,5 +113,4 @@ def _check(family: str) -> None:
 
 @cache
 def _rows(name: str) -> tuple[dict[str, str], ...]:
-    with (files(__package__) / name).open(encoding="utf-8") as file:
-        return tuple(csv.DictReader(file))
+    return tuple(packaged_rows(__package__, name))

@@ -13,8 +13,7 @@ from fba.arrays import Bool, Float64
 from fba.choices import Baseline
 from fba.emotion.recogniser import NEUTRAL, UNKNOWN, ExpressionRecogniser, Reading
 from fba.errors import OptionError
-from fba.face import resolve
-from fba.face.resolve import FaceSettings, known_faps
+from fba.face import FaceSettings, known_faps, resolve
 from fba.parameters import faps
 from fba.tracks import FaceTrack
 

@@ -13,12 +13,12 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Floating
-from fba.easing import smoothstep
+from fba.emotion._expression import Expression
 from fba.emotion._profiles import measurements, vocabulary
-from fba.emotion.expression import Expression
 from fba.errors import OptionError
 from fba.face import Definitions
 from fba.parameters import FAP_COUNT, faps
+from fba.sampling import smoothstep
 
 MIN_ACTIVATION = 2.0
 """Activation of an expression without one and without a family: the smallest in the table."""

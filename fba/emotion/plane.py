@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.emotion._expression import NEUTRAL_POINT
+from fba.emotion._expressions import expressions
 from fba.emotion._rules import Rules
 from fba.emotion.blending import Blend, combine
-from fba.emotion.expression import NEUTRAL_POINT
-from fba.emotion.expressions import expressions
 from fba.errors import OptionError
 
 SCALE_MIN = 1.0

@@ -17,10 +17,10 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from fba.arrays import Bool, Float64, Intp
+from fba.emotion._expression import FAMILIES, NEUTRAL_POINT
+from fba.emotion._expressions import expression
 from fba.emotion._likelihood import INTENSITIES, PRIORS, candidates, model
 from fba.emotion._mixing import point_of
-from fba.emotion.expression import FAMILIES, NEUTRAL_POINT
-from fba.emotion.expressions import expression
 from fba.errors import OptionError
 from fba.parameters import FAP_COUNT, fap_numbers
 

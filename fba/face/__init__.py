@@ -6,6 +6,7 @@ vertices = fba.face.Deformer(model)(shown)     # float32 (T, V, 3): all vertices
 """
 
 from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
+from fba.face._resolve import FaceSettings, Resolver, fit_values, known_faps, resolve, shown_faps
 from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
@@ -15,7 +16,7 @@ from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import FaceModel, Material, Part, compact
 from fba.face.points import Eyeballs, FeaturePointFace
-from fba.face.resolve import Resolver, resolve
+from fba.face.shape_names import arkit_names, arkit_of
 
 __all__ = [
     "EXPRESSION_NAMES",
@@ -28,6 +29,7 @@ __all__ = [
     "FaceDefTables",
     "FaceDefTransform",
     "FaceModel",
+    "FaceSettings",
     "Fapu",
     "FeaturePointFace",
     "Function",
@@ -37,8 +39,13 @@ __all__ = [
     "Part",
     "Resolver",
     "Term",
+    "arkit_names",
+    "arkit_of",
     "compact",
     "feature_point_names",
+    "fit_values",
+    "known_faps",
     "neutral_points",
     "resolve",
+    "shown_faps",
 ]

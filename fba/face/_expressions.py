@@ -13,8 +13,7 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Float32
-from fba.face.mates import fill
-from fba.parameters import EXPRESSION_SELECT_MAX, FAP_COUNT, VISEME_SELECT_MAX, fap_numbers
+from fba.parameters import EXPRESSION_SELECT_MAX, FAP_COUNT, VISEME_SELECT_MAX, fap_numbers, fill_from_mates
 from fba.text_files import packaged_rows
 
 VISEME_NAMES = (
@@ -79,5 +78,5 @@ def _default() -> Definitions:
         entry = (int(row["select"]), fap_numbers()[row["fap"]] - 1)
         tables[row["kind"]][entry] = float(row["value"])
         listed[row["kind"]][entry] = True
-    filled = {kind: fill(table, listed[kind])[0] for kind, table in tables.items()}
+    filled = {kind: fill_from_mates(table, listed[kind])[0] for kind, table in tables.items()}
     return Definitions(filled["viseme"].astype(np.float32), filled["expression"].astype(np.float32))

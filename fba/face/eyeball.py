@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fba.arrays import Float64, Floating
-from fba.face.feature_points import row_of
 from fba.face.points import EYEBALL_PER_IRIS
 from fba.geometry import principal_axes
+from fba.parameters import point_rows
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
@@ -50,7 +50,7 @@ def eyeballs(model: FaceModel) -> dict[str, Eyeball]:
     for part in model.of_kind("eye"):
         own = float(part.vertices[:, 0].min() + part.vertices[:, 0].max()) / 2 if len(part.vertices) else 0.0
         side = "left" if own > middle else "right"
-        fitted = fit_eyeball(part, model.points[row_of()[PUPIL_POINT[side]]])
+        fitted = fit_eyeball(part, model.points[point_rows()[PUPIL_POINT[side]]])
         if fitted is None:
             continue
         centre, radius, error, share = fitted
@@ -85,7 +85,7 @@ def flat_width(part: Part) -> float | None:
 
 def _middle_x(points: Float64) -> float:
     """Return the x halfway between the pupils, or 0 where they are unknown."""
-    pair = points[[row_of()["3.5"], row_of()["3.6"]], 0]
+    pair = points[[point_rows()["3.5"], point_rows()["3.6"]], 0]
     return float(pair.mean()) if np.isfinite(pair).all() else 0.0
 
 
@@ -127,7 +127,7 @@ def fit_sphere(points: Float64) -> tuple[Float64, float, bool]:
 
 def gaze(model: FaceModel, eye: Eyeball) -> Float64 | None:
     """Return the unit vector from the eyeball's centre to its pupil point, None where the model has none."""
-    arm = model.points[row_of()[PUPIL_POINT[eye.side]]] - eye.centre
+    arm = model.points[point_rows()[PUPIL_POINT[eye.side]]] - eye.centre
     length = float(np.linalg.norm(arm))
     return arm / length if np.isfinite(length) and length > 0 else None
 

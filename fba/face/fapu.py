@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.errors import ModelError
-from fba.face.feature_points import row_of
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 
 PER_DISTANCE = 1024
 """Each unit of length is a distance of the face divided by this."""
@@ -42,9 +41,11 @@ class Fapu:
         is the mean of left and right where both exist. Raises ModelError where one is not positive.
         """
         array = np.asarray(points, dtype=np.float64)
-        if array.shape != (len(row_of()), 3):
-            raise ModelError(f"FAPU: feature points must have shape ({len(row_of())}, 3), not {array.shape}")
-        x, y = ({name: float(array[row, axis]) for name, row in row_of().items()} for axis in (0, 1))
+        if array.shape != (len(point_rows()), 3):
+            raise ModelError(
+                f"FAPU: feature points must have shape ({len(point_rows())}, 3), not {array.shape}"
+            )
+        x, y = ({name: float(array[row, axis]) for name, row in point_rows().items()} for axis in (0, 1))
         pupils = (y["3.5"] + y["3.6"]) / 2
         distances = {
             "IRISD": ((y["3.1"] - y["3.3"] + y["3.2"] - y["3.4"]) / 2, "3.1 above 3.3 and 3.2 above 3.4"),

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Float64
-from fba.parameters import feature_points
+from fba.parameters import point_rows
 from fba.text_files import packaged_rows
 
 MIRRORED = {
@@ -35,13 +35,7 @@ FREE_POINTS = ("7.1", "11.5")
 @cache
 def names() -> tuple[str, ...]:
     """Return the 84 names, in the order of every array of feature points."""
-    return tuple(point.name for point in feature_points())
-
-
-@cache
-def row_of() -> dict[str, int]:
-    """Return the row in an array of feature points, by name."""
-    return {name: row for row, name in enumerate(names())}
+    return tuple(point_rows())
 
 
 @cache
@@ -50,8 +44,8 @@ def neutral_points() -> Float64:
     points = np.full((len(names()), 3), np.nan)
     for row in packaged_rows(__package__, "neutral.csv"):
         position = np.array([float(row[axis]) for axis in "xyz"]) / 1000.0
-        points[row_of()[row["point"]]] = position
+        points[point_rows()[row["point"]]] = position
         if row["point"] in MIRRORED:
-            points[row_of()[MIRRORED[row["point"]]]] = position * (-1.0, 1.0, 1.0)
+            points[point_rows()[MIRRORED[row["point"]]]] = position * (-1.0, 1.0, 1.0)
     points.flags.writeable = False
     return points

@@ -16,7 +16,7 @@ from fba.errors import ModelError
 from fba.face._expressions import Definitions
 from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables
 from fba.face.fapu import Fapu
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import names
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh import Material, Meshes, mesh_arrays
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
@@ -24,7 +24,7 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 if TYPE_CHECKING:
     from fba.face.interpolation.table import InterpolationTable
 
-__all__ = ["PART_KINDS", "FaceModel", "Material", "Part", "bind", "point_row"]
+__all__ = ["PART_KINDS", "FaceModel", "Material", "Part", "bind"]
 
 
 PART_KINDS = ("skin", "eye", "teeth", "tongue", "mouth", "brow", "lash", "hair", "other")
@@ -239,13 +239,6 @@ def bind(parts: tuple[Part, ...], points: npt.ArrayLike, most: float) -> Int32:
     distance, vertex = tree.query(positions[known])
     bound[known] = np.where(distance <= most, vertex, -1)
     return bound
-
-
-def point_row(name: str) -> int:
-    """Return the row of a feature point in `FaceModel.points`; ModelError for an unknown name."""
-    if name not in row_of():
-        raise ModelError(f"there is no feature point {name!r}")
-    return row_of()[name]
 
 
 def compact(model: FaceModel) -> FaceModel:

@@ -16,8 +16,8 @@ import numpy.typing as npt
 from fba.arrays import Float32, Float64
 from fba.errors import ModelError
 from fba.face.fapu import PER_DISTANCE, Fapu
-from fba.face.feature_points import MIRRORED, names, neutral_points, row_of
-from fba.parameters import FAP_COUNT, faps
+from fba.face.feature_points import MIRRORED, names, neutral_points
+from fba.parameters import FAP_COUNT, faps, point_rows
 from fba.rotations import axis_matrices
 from fba.text_files import packaged_rows
 
@@ -58,9 +58,11 @@ def _followers() -> tuple[tuple[int, int, Float64], ...]:
     for row in packaged_rows(__package__, "followers.csv"):
         weight = np.array([float(row[axis]) for axis in "xyz"])
         point, source = row["point"], row["source"]
-        followers.append((row_of()[point], row_of()[source], weight))
+        followers.append((point_rows()[point], point_rows()[source], weight))
         if point in MIRRORED:
-            followers.append((row_of()[MIRRORED[point]], row_of()[MIRRORED.get(source, source)], weight))
+            followers.append(
+                (point_rows()[MIRRORED[point]], point_rows()[MIRRORED.get(source, source)], weight)
+            )
     return tuple(followers)
 
 
@@ -75,7 +77,7 @@ def shift_table(fapu: Fapu) -> Float64:
         if fap.number in THRUST_EYE:
             points = (THRUST_EYE[fap.number],)
         for name in points:
-            table[fap.number - 1, row_of()[name]] += step
+            table[fap.number - 1, point_rows()[name]] += step
     own = table.copy()
     for point, source, weight in _followers():
         table[:, point] += own[:, source] * weight
@@ -114,18 +116,21 @@ class FeaturePointFace:
     @cached_property
     def eyeball_centres(self) -> Float64:
         """(2, 3) centres of the eyeballs in the neutral face, the left one first."""
-        pupils: Float64 = self.points[[row_of()["3.5"], row_of()["3.6"]]]
+        pupils: Float64 = self.points[[point_rows()["3.5"], point_rows()["3.6"]]]
         return pupils - (0.0, 0.0, self.eyeball_radius)
 
     @cached_property
     def head_centre(self) -> Float64:
         """(3,) centre of the head's rotations."""
-        return np.asarray(self.points[row_of()["7.1"]])
+        return np.asarray(self.points[point_rows()["7.1"]])
 
     @cached_property
     def jaw_hinge(self) -> Float64:
         """(3,) a point on the axis of the jaw, below the ears."""
-        top, bottom = self.points[[row_of()["10.7"], row_of()["10.8"]]], self.points[row_of()["10.9"]]
+        top, bottom = (
+            self.points[[point_rows()["10.7"], point_rows()["10.8"]]],
+            self.points[point_rows()["10.9"]],
+        )
         ear = (top[0] + top[1] + bottom * 2) / 4
         return np.array([0.0, ear[1], ear[2]])
 
@@ -172,7 +177,7 @@ class FeaturePointFace:
     def _local(self, values: Float64) -> Float64:
         shift = (values @ self._shift).reshape(len(values), -1, 3)
         moved = self.points + shift
-        row = row_of()
+        row = point_rows()
         mandible = [row[name] for name in MANDIBLE]
         moved[:, mandible] = _rotate_x(self.points[mandible], self.jaw_hinge, self._jaw_angle(values))
         moved[:, mandible] += shift[:, mandible]
@@ -190,7 +195,7 @@ class FeaturePointFace:
 
     def _jaw_angle(self, values: Float64) -> Float64:
         """Return the angle that lowers the chin (2.1) by exactly value x MNS, as far as the hinge allows."""
-        chin = self.points[row_of()["2.1"]] - self.jaw_hinge
+        chin = self.points[point_rows()["2.1"]] - self.jaw_hinge
         radius, rest = np.hypot(chin[1], chin[2]), np.arctan2(chin[1], chin[2])
         height = chin[1] - values[:, OPEN_JAW - 1] * self.fapu.MNS
         return np.asarray(rest - np.arcsin(np.clip(height / radius, -1.0, 1.0)))

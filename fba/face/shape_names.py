@@ -25,7 +25,7 @@ WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 @cache
 def arkit_names() -> tuple[str, ...]:
-    """Return the 52 names of ARKit's blendshapes, sorted."""
+    """Return the 52 names of ARKit's blendshapes in the order of its own and Live Link Face's data."""
     return tuple(row["shape"] for row in packaged_rows(__package__, "arkit.csv"))
 
 

@@ -9,9 +9,9 @@ from fba.gltf._document import MAX_ITEMS, Document, open_document, parse_json
 from fba.gltf._part_materials import PartWriter, convert_material, read_material
 from fba.gltf._reader import read_document, read_gltf
 from fba.gltf._scene import Channel, Clip, Gltf, GltfMaterial, GltfMesh, Node, Primitive, Skin
+from fba.gltf._surfaces import Surface, surfaces
 from fba.gltf._values import MAX_TEXT, Budget, Value, locating_errors, optional_member
 from fba.gltf._writer import Builder
-from fba.gltf.surfaces import Surface, surfaces
 
 __all__ = [
     "MAX_ITEMS",

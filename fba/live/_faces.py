@@ -10,10 +10,10 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture.live import LiveBlendshapes
-from fba.capture.sampling import GAP
 from fba.live._order import Timed
 from fba.live._protocols.sample import DatagramError, Sample
 from fba.live._summary import Summary
+from fba.sampling import GAP
 from fba.tracks import FaceTrack
 
 SWAPPED = {

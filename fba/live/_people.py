@@ -13,17 +13,16 @@ from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64, Intp
 from fba.body import Skeleton
-from fba.capture import SkeletonMotion
-from fba.capture.blendshapes.shape_table import amounts_of
+from fba.capture import SkeletonMotion, shape_faps
 from fba.capture.live import LiveBlendshapes, LiveSkeleton
-from fba.capture.sampling import GAP, TIME_TOLERANCE, find_rate
 from fba.errors import ModelError
-from fba.face.shape_names import arkit_of
+from fba.face import arkit_of
 from fba.live._order import Timed
 from fba.live._protocols import unity_bones
 from fba.live._protocols.sample import BoneTurn, Sample
 from fba.live._summary import Summary
 from fba.live.recording import stream_rate
+from fba.sampling import GAP, TIME_TOLERANCE, find_rate
 from fba.tracks import BodyTrack, FaceTrack
 
 START_SECONDS = 1.0
@@ -163,7 +162,7 @@ class _Face:
             plain: name
             for name in sent
             if name not in shapes.values()
-            and amounts_of(plain := OLD_NAMES.get(name.lower(), name)) is not None
+            and shape_faps(plain := OLD_NAMES.get(name.lower(), name)) is not None
         }
         if len(shapes) >= MIN_SHAPES and others:
             summary.notes.append(

@@ -33,7 +33,10 @@ from fba.parameters._tables import (
     fap_steps,
     faps,
     feature_points,
+    fill_from_mates,
     joints,
+    mate_columns,
+    point_rows,
 )
 
 __all__ = [
@@ -69,5 +72,8 @@ __all__ = [
     "fap_steps",
     "faps",
     "feature_points",
+    "fill_from_mates",
     "joints",
+    "mate_columns",
+    "point_rows",
 ]

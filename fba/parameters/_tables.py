@@ -14,8 +14,9 @@ from importlib.resources import files
 from typing import Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from fba.arrays import Bool, Int64
+from fba.arrays import Bool, Int64, Intp
 
 FAP_COUNT = 68
 BAP_COUNT = 296
@@ -265,3 +266,31 @@ def fap_numbers() -> dict[str, int]:
 def bap_numbers() -> dict[str, int]:
     """BAP number by name."""
     return {b.name: b.number for b in baps()}
+
+
+@cache
+def point_rows() -> dict[str, int]:
+    """Return the row of each feature point, by name, in arrays of all 84."""
+    return {point.name: row for row, point in enumerate(feature_points())}
+
+
+@cache
+def mate_columns() -> tuple[Intp, ...]:
+    """Return columns (68,) that unsent FAPs copy: mate, lip mate, its mate; their own without one."""
+    mate = np.array([(f.left_right_mate or f.number) - 1 for f in faps()])
+    lip = np.array([(f.lip_mate or f.number) - 1 for f in faps()])
+    return (mate, lip, mate[lip])
+
+
+def fill_from_mates(values: npt.NDArray[np.generic], sent: Bool) -> tuple[npt.NDArray[np.generic], Bool]:
+    """Return values (..., 68) with unsent FAPs copied from their mates, and a mask of those now known.
+
+    ISO/IEC 14496-2 leaves it to the decoder to estimate unsent FAPs: the other side of the face copies a side
+    that is sent, and the outer contour of the lips copies the inner one and the other way round.
+    """
+    filled, known = values.copy(), sent.copy()
+    for column in mate_columns():
+        copied = ~known & sent[..., column]
+        np.copyto(filled, values[..., column], where=copied)
+        known |= copied
+    return filled, known

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
-from fba.body import SIDES, BapSolver, Skeleton
+from fba.body import SIDES, BapSolver, Skeleton, find_stance
 from fba.body.displacement import REACH
-from fba.body.stance import find_stance, sole_points
+from fba.body.stance import sole_points
 from fba.compiled import compiled
 from fba.planning._tolerance import Tolerance
 

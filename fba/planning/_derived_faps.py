@@ -1,7 +1,7 @@
 """FAPs that a player derives from others, and the FAPs to send so that it derives all values correctly.
 
 ISO/IEC 14496-2 leaves it to the decoder how unsent FAPs are interpolated; these are the rules that the
-standard suggests and `fba.face.resolve` follows (see `fba.face.mates`).
+standard suggests and `fba.face.resolve` follows (see `fba.parameters.fill_from_mates`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Int64
-from fba.face import InterpolationTable
+from fba.face import InterpolationTable, fit_values
 from fba.face.interpolation.table import sources_of
-from fba.face.mates import donors, fill
-from fba.face.resolve import fit_values
-from fba.parameters import FAP_COUNT, fap_groups
+from fba.parameters import FAP_COUNT, fap_groups, fill_from_mates, mate_columns
 from fba.planning._segments import Cuts
 from fba.tracks import FaceTrack
 
@@ -51,7 +49,9 @@ class FitChoice:
 @cache
 def related_faps() -> tuple[tuple[int, ...], ...]:
     """Return the columns of low-level FAPs in sets of 1, 2 or 4 that can be derived from one another."""
-    sets = {frozenset([column, *(int(by[column]) for by in donors())]) for column in range(2, FAP_COUNT)}
+    sets = {
+        frozenset([column, *(int(by[column]) for by in mate_columns())]) for column in range(2, FAP_COUNT)
+    }
     return tuple(sorted(tuple(sorted(related)) for related in sets))
 
 
@@ -127,7 +127,7 @@ def derive_others(
             continue
         copied: Bool | np.bool_ = np.False_
         known: Bool | np.bool_ = np.False_  # whether a better donor gives it
-        for donor in (int(by[column]) for by in donors()):
+        for donor in (int(by[column]) for by in mate_columns()):
             if donor == column:
                 continue
             gives = np.bool_(donor in sent) if fit is None or donor in sent else fit.gives[donor]
@@ -168,7 +168,7 @@ class FitFaps:
 def find_fit_faps(face: FaceTrack, table: InterpolationTable, step: Int64) -> FitFaps:
     """Return the FAPs of a face as a FIT computes them. step: int64 (68,), of the quantiser."""
     fit = fit_values(face, table)
-    filled, known = fill(fit.values, fit.known)
+    filled, known = fill_from_mates(fit.values, fit.known)
     values = np.rint(filled).astype(np.int32)
     known[:, :2] = False
     sources = np.zeros(FAP_COUNT, dtype=np.bool_)

@@ -14,8 +14,7 @@ from fba.arrays import Bool, Int64
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, levels, quantise, range_limit, step_scale
 from fba.errors import FbaWarning
 from fba.face import Resolver
-from fba.face.mates import fill
-from fba.parameters import BAP_COUNT, FAP_COUNT, bap_angles
+from fba.parameters import BAP_COUNT, FAP_COUNT, bap_angles, fill_from_mates
 from fba.planning._code_lengths import BEYOND_RANGES
 from fba.planning._derived_faps import derive_others, interpolated_faps, related_faps, subsets
 from fba.tracks import BodyTrack, FaceTrack
@@ -293,7 +292,9 @@ class _Learnt:
             return bool((track.mask[0] == sent).all())
         values = track.values[0]
         shown = np.where(sent, values, 0)
-        return bool(((fill(shown, sent)[0] if isinstance(track, FaceTrack) else shown) == values).all())
+        return bool(
+            ((fill_from_mates(shown, sent)[0] if isinstance(track, FaceTrack) else shown) == values).all()
+        )
 
     def _use(self, part: _Part) -> None:
         """Remember which values are not 0, which FAPs are not equal, and which the source sends."""

@@ -17,8 +17,7 @@ from fba.arrays import Float32, Float64, Int64
 from fba.face import FaceModel
 from fba.face.deform.displacements import DisplacementMeter
 from fba.face.deform.flat_tables import KIND_ORDER, Shifts, Transforms
-from fba.face.mates import donors
-from fba.parameters import FAP_COUNT
+from fba.parameters import FAP_COUNT, mate_columns
 from fba.planning._tolerance import Tolerance
 
 
@@ -160,7 +159,7 @@ def _find_worst_vertices(meter: DisplacementMeter) -> Int64:
             chosen = rng.choice(moving, rng.integers(1, TUNING.max_faps_off + 1))
             row[chosen] = rng.uniform(-0.0005, 0.0005, len(chosen)) / steepest[chosen]
             if rng.random() < 0.7:  # both sides alike
-                row[donors()[0][chosen]] = row[chosen]
+                row[mate_columns()[0][chosen]] = row[chosen]
         measured = meter.measure(source, source + errors)
         worst = np.unique(measured.worst[measured.largest > 0])
         _worst_vertices[meter.model] = worst

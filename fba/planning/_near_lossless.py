@@ -13,11 +13,9 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.codec import EncoderOptions, EncoderStatistics, decode
 from fba.errors import FbaWarning, RangeError
-from fba.face import FaceModel, resolve
+from fba.face import FaceModel, known_faps, resolve
 from fba.face.deform.displacements import DisplacementMeter
-from fba.face.mates import donors
-from fba.face.resolve import known_faps
-from fba.parameters import fap_steps
+from fba.parameters import fap_steps, mate_columns
 from fba.planning._body_tolerance import beyond_body, body_errors, encode_body_within_tolerance, fit_bodies
 from fba.planning._derived_faps import interpolated_faps, related_faps
 from fba.planning._face_search import Segment, search_faps
@@ -222,7 +220,7 @@ def _groups(sent: Bool, known: Bool) -> dict[int, tuple[int, ...]]:
     """Return for each low-level FAP that is sent the columns that a player shows with its values."""
     groups = {int(column): [int(column)] for column in np.flatnonzero(sent) if column > 1}
     for column in np.flatnonzero(known & ~sent):
-        donor = next((int(by[column]) for by in donors() if sent[by[column]]), None)
+        donor = next((int(by[column]) for by in mate_columns() if sent[by[column]]), None)
         if donor in groups:
             groups[donor].append(int(column))
     return {column: tuple(columns) for column, columns in groups.items()}

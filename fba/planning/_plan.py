@@ -22,8 +22,7 @@ from fba.codec import (
 )
 from fba.encoder_options import PLANNED, REFERENCE, PlannedPreset
 from fba.errors import FbaWarning
-from fba.face import resolve
-from fba.face.resolve import FaceSettings, known_faps
+from fba.face import FaceSettings, known_faps, resolve
 from fba.limits import Limits
 from fba.parameters import FAP_COUNT, fap_steps
 from fba.planning._code_lengths import INTRA_BITS, code_lengths

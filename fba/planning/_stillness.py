@@ -14,10 +14,10 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
-from fba.body import SIDES, BapSolver
+from fba.body import SIDES, BapSolver, find_stance
 from fba.body.footing import foot_frames
 from fba.body.solve.motions import BapMotion, bap_motions
-from fba.body.stance import find_stance, heel_and_ball, sole_points
+from fba.body.stance import heel_and_ball, sole_points
 from fba.codec import EncoderOptions, step_scale
 from fba.compiled import compiled
 from fba.parameters import BAP_COUNT, bap_steps

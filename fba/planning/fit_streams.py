@@ -10,11 +10,10 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.codec import EncoderOptions, EncoderStatistics, decode
 from fba.errors import ModelError, OptionError
-from fba.face import Deformer, FaceModel, resolve
+from fba.face import Deformer, FaceModel, known_faps, resolve
 from fba.face.deform.displacements import unit_motions, vertex_distances
 from fba.face.learning import Spread, send_sources
 from fba.face.learning.reduction import linked_columns
-from fba.face.resolve import known_faps
 from fba.planning._derived_faps import interpolated_faps
 from fba.planning._plan import encode_planned
 from fba.tracks import FaceTrack

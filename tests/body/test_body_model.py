@@ -14,13 +14,12 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fba.body import BapSolver, Skeleton
+from fba.body import BapSolver, BodyModel, BodyPart, Skeleton
 from fba.body._storage import build, read_body
-from fba.body.model import BodyModel, BodyPart
 from fba.errors import FormatError, ModelError
 from fba.gltf._document import join_container, parse_document, split_container
 from fba.gltf._reader import read_document
-from fba.gltf.surfaces import surfaces
+from fba.gltf._surfaces import surfaces
 from fba.parameters import joints
 from json_places import REMOVED, put
 from small_bodies import random_pose, rod

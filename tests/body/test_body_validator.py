@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from small_bodies import rod
 
 SCRIPT = """

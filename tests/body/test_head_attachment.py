@@ -9,21 +9,20 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from fba.body import BapSolver
-from fba.body.head_attachment import AttachedHead, attach_head, placement
-from fba.body.model import BodyModel
+from fba.body import AttachedHead, BapSolver, BodyModel, attach_head
+from fba.body.head_attachment import placement
 from fba.body.skin.skin_weights import strongest_weights
 from fba.errors import ModelError
 from fba.face.deform._deformer import Deformer
-from fba.face.model import FaceModel, point_row
-from fba.parameters import baps
+from fba.face.model import FaceModel
+from fba.parameters import baps, point_rows
 from small_bodies import Float64, rod
 
 FREE = ("skin", "mouth", "hair", "other")
 
 
 def pupils(model: FaceModel) -> Float64:
-    return model.points[[point_row("3.5"), point_row("3.6")]]
+    return model.points[[point_rows()["3.5"], point_rows()["3.6"]]]
 
 
 @pytest.fixture(scope="module")
@@ -85,8 +84,8 @@ def test_the_face_itself_is_stiff(head: AttachedHead) -> None:
     matrices = posed(**NOD)
     moved = head.skin(model.vertices, matrices)
     frame = head.frame(matrices)
-    upper = model.vertices[:, 1] > model.points[point_row("8.1")][1]
-    upper &= model.vertices[:, 2] > model.points[point_row("10.7")][2]
+    upper = model.vertices[:, 1] > model.points[point_rows()["8.1"]][1]
+    upper &= model.vertices[:, 2] > model.points[point_rows()["10.7"]][2]
     expected = model.vertices[upper] @ frame[:3, :3].T + frame[:3, 3]
     np.testing.assert_allclose(moved[upper], expected, atol=3e-4)
 
@@ -126,7 +125,7 @@ def test_normals_turn_along(head: AttachedHead) -> None:
 
 def test_what_lies_under_the_clothes(head: AttachedHead) -> None:
     model = FaceModel.default()
-    chin = model.points[point_row("2.1")][1]
+    chin = model.points[point_rows()["2.1"]][1]
     hidden = head.hidden[: len(model.part("skin").vertices)]
     assert hidden.any()
     assert model.vertices[: len(hidden)][hidden][:, 1].max() < chin - 0.02

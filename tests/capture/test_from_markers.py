@@ -21,9 +21,8 @@ from fba.capture.markers.marker_maps import change_map, find_map, marker_sets, r
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError
 from fba.face import Deformer, FaceModel
 from fba.face.authoring import author
-from fba.face.feature_points import row_of
 from fba.limits import Limits
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 from small_head import adult_points, small_head
 from tools.captures.marked_actor import NAMES, Take, perform
 
@@ -97,7 +96,7 @@ def test_the_jaw_goes_back_as_far_as_the_actors() -> None:
 
 def test_a_long_chin() -> None:
     """It is 15 mm lower below the ears, so it goes back by a third more than that of the built-in head."""
-    points, rows = adult_points().copy(), row_of()
+    points, rows = adult_points().copy(), point_rows()
     for name, share in (("2.1", 1), ("2.10", 0.6), ("2.11", 1), ("2.12", 1), ("2.13", 0.5), ("2.14", 0.5)):
         points[rows[name], 1] -= 0.015 * share
     head = small_head(points, cell=0.005)

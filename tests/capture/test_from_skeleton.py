@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 import fba
 from capture_bodies import ARM, bone_errors, limb_bones, motion, source_places
 from fba import Animation
-from fba.body import BapSolver, Skeleton
-from fba.body.footing import GroundedPoser, lowest_sole
-from fba.body.model import BodyModel
+from fba.body import BapSolver, BodyModel, GroundedPoser, Skeleton
+from fba.body.footing import lowest_sole
 from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
 from fba.capture.comparison._figure import find_up, result_figure, source_figure
 from fba.capture.comparison._measurement import sole_heights, source_scale

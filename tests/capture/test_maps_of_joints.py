@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fba
-from fba.body.skeleton import ROOT
+from fba.body import ROOT
 from fba.capture.joint_maps import change_map, find_map, read_map, write_map
 from fba.capture.motion import SkeletonMotion
 from fba.errors import FormatError, LimitError, OptionError

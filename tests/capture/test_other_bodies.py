@@ -13,7 +13,7 @@ from capture_bodies import motion
 from fba.animation import Animation
 from fba.body import BapSolver, Skeleton, convention_names
 from fba.capture import RetargetReport, SkeletonMotion, from_skeleton, retarget_report
-from fba.capture.skeleton import is_direct
+from fba.capture._skeleton import is_direct
 from fba.errors import FbaWarning, ModelError
 from fba.parameters import bap_numbers, joints
 

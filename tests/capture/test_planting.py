@@ -10,9 +10,8 @@ from scipy.spatial.transform import Rotation
 from test_from_skeleton import NAMES
 
 from capture_bodies import bone_errors, limb_bones, motion
-from fba.body import BapSolver, Skeleton, ground
+from fba.body import BapSolver, BodyModel, Skeleton, ground
 from fba.body.footing import lowest_sole
-from fba.body.model import BodyModel
 from fba.capture import SkeletonMotion, from_skeleton, retarget_report
 from fba.capture._limbs import foot_planting, soles
 from fba.parameters import bap_numbers

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from capture_bodies import motion
 from fba.animation import Animation, FaceTrack
 from fba.body import BapSolver, Skeleton
-from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report, skeleton
+from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
+from fba.capture import _skeleton as skeleton
 from fba.errors import ModelError
 from fba.parameters import bap_numbers, baps, joints
 

@@ -23,9 +23,9 @@ from fba.capture.virtual_markers._mapping_files import read_mapping, write_mappi
 from fba.capture.virtual_markers.lids import find_rows, lid_at, turn_to_camera
 from fba.errors import ModelError, OptionError
 from fba.face import FaceModel
-from fba.face.feature_points import row_of
 from fba.formats.gltf.moved_head import write_moved_head
 from fba.gltf._reader import read_gltf
+from fba.parameters import point_rows
 from tools.captures.marked_actor import perform as act
 
 UPPER, LOWER = "3.1", "3.3"
@@ -38,7 +38,7 @@ def head() -> MarkedHead:
 
 
 def bound(point: str) -> int:
-    return int(head().bound[row_of()[point]])
+    return int(head().bound[point_rows()[point]])
 
 
 @cache

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.virtual_markers import (
     MarkedHead,
     MarkerMapping,
@@ -25,8 +25,8 @@ from fba.capture.virtual_markers.weights import find_weights
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import Deformer, FaceModel
 from fba.face.authoring.surface.landmarks import find_landmarks
-from fba.face.feature_points import row_of
 from fba.face.model import Part
+from fba.parameters import point_rows
 from tools.captures.marked_actor import Take
 from tools.captures.marked_actor import perform as act
 
@@ -382,7 +382,7 @@ def test_inner_lips_follow_the_outer_ones() -> None:
     assert {name for name in following if name.endswith(" inner")} == set(inner)
     moved = shown.vertices(90) - head().vertices
     for name, point in inner.items():
-        vertex = model.bound[row_of()[point]]
+        vertex = model.bound[point_rows()[point]]
         outer = name.removesuffix(" inner")
         assert proposed().markers[name].vertex == vertex
         assert proposed().markers[name].follows == outer
@@ -403,10 +403,10 @@ def test_lids_shut_along_their_whole_length() -> None:
     truth = np.linalg.norm(deformer.local(faps) - deformer.local(np.zeros(68, np.float32)), axis=1)
     margin = find_landmarks(head().skin, model.points, model.bound).contour("left upper lid")
     at = [int(np.flatnonzero(head().skin.number == vertex)[0]) for vertex in margin]
-    middle = model.bound[row_of()["3.1"]]
+    middle = model.bound[point_rows()["3.1"]]
     assert len(at) > 20
     np.testing.assert_allclose(moved[at], truth[at] / truth[middle], atol=0.15)
-    below = model.bound[row_of()["3.3"]]
+    below = model.bound[point_rows()["3.3"]]
     assert abs(moved[below]) < 0.02  # the walk does not go round the corners of the eye
 
 

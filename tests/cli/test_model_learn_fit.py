@@ -12,9 +12,8 @@ import pytest
 
 import fba
 from fba import Animation, FaceTrack
-from fba.face import FaceModel, InterpolationTable
+from fba.face import FaceModel, InterpolationTable, resolve
 from fba.face.learning import send_sources
-from fba.face.resolve import resolve
 from small_face import small_face
 
 Run = Callable[..., tuple[int, str, str]]

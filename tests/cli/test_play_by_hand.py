@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fba import player
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.face import FaceModel
 
 Run = Callable[..., Any]

@@ -14,9 +14,9 @@ import fba
 import stored_models
 from fba import Animation, BodyTrack, FaceTrack
 from fba.codec import quantise
+from fba.face import resolve
 from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.resolve import resolve
 from fba.planning import hold_still
 
 Run = Callable[..., Any]

@@ -12,8 +12,7 @@ import pytest
 
 import fba
 from fba import Animation, FaceTrack
-from fba.face import Deformer, FaceModel
-from fba.face.resolve import resolve
+from fba.face import Deformer, FaceModel, resolve
 
 Run = Callable[..., Any]
 

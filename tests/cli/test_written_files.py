@@ -11,7 +11,7 @@ import pytest
 
 import fba
 from fba import Animation
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.gltf import read_gltf
 
 Run = Callable[..., tuple[int, str, str]]

@@ -12,10 +12,10 @@ from fba.animation import Animation
 from fba.arrays import Float32
 from fba.emotion import Damping, Mood, MoodCurve, emote, expression, expressions, modify
 from fba.errors import OptionError
+from fba.face import resolve
 from fba.face.deform._deformer import Deformer
-from fba.face.model import FaceModel, point_row
-from fba.face.resolve import resolve
-from fba.parameters import fap_numbers, faps
+from fba.face.model import FaceModel
+from fba.parameters import fap_numbers, faps, point_rows
 from fba.tracks import BodyTrack, FaceTrack
 
 UPPER, LOWER = (18, 19), (20, 21)
@@ -52,7 +52,7 @@ def speech() -> Animation:
 def lips_apart(shown: Float32) -> np.ndarray:
     """Millimetres between the lips of the built-in head, middle and both sides, (T, 3): heights only."""
     deformer = Deformer(FaceModel.default())
-    pairs = [(point_row(a), point_row(b)) for a, b in (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))]
+    pairs = [(point_rows()[a], point_rows()[b]) for a, b in (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))]
     rows = []
     for one in shown:
         points = deformer.feature_points(np.where(np.arange(68) // 3 == 16, 0, one).astype(np.float32))

@@ -13,8 +13,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fba.face import FaceModel
-from fba.face.feature_points import row_of
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 
 HERE = Path(__file__).parent
 FIGURE = HERE.parents[1] / "tools" / "figure"
@@ -26,7 +25,7 @@ def head() -> FaceModel:
 
 
 def place(head: FaceModel, point: str) -> np.ndarray:
-    return head.points[row_of()[point]]
+    return head.points[point_rows()[point]]
 
 
 def test_one_shared_instance_with_everything(head: FaceModel) -> None:

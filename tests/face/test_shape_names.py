@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fba.face.shape_names import arkit_names, arkit_of, canonical_names, fap_of
+from fba.face import arkit_names, arkit_of
+from fba.face.shape_names import canonical_names, fap_of
 
 
 def test_there_are_52_and_each_knows_itself() -> None:

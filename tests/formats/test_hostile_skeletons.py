@@ -13,6 +13,7 @@ import pytest
 
 import fba
 from fba.animation import Animation, BodyTrack
+from fba.capture import SkeletonMotion
 from fba.errors import FbaWarning, FormatError
 from fba.formats.bvh import _reader as reader
 from fba.parameters import BAP_COUNT, bap_numbers
@@ -34,7 +35,7 @@ def text(rows: list[str], offset: str = "0", time: str = "0.1") -> str:
 
 
 def test_more_frames_than_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader, "MAX_FRAMES", 3)
+    monkeypatch.setattr(SkeletonMotion, "MAX_FRAMES", 3)
     assert reader.parse(text(["0 0 0"] * 3)).rotations.shape[0] == 3
     with pytest.raises(FormatError, match="more than 3 frames; cut the motion into pieces") as caught:
         reader.parse(text(["0 0 0"] * 9))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fba
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers._motion import MarkerMotion
 from fba.errors import FbaError, FbaWarning, FormatError, LimitError
 from fba.formats import format_of
 from fba.limits import Limits

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fba.capture.markers.motion import MarkerMotion, regular_times
+from fba.capture.markers._motion import MarkerMotion
 from fba.errors import FormatError
 from fba.formats import format_of
 from fba.formats.time_codes import (
@@ -17,6 +17,7 @@ from fba.formats.time_codes import (
     read_time_codes,
     seconds_between,
 )
+from fba.sampling import regular_times
 from tools.captures import marker_files
 
 

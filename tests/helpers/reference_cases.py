@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.animation import Animation
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.cli.pose_options import Pose, still_animation
-from fba.face.model import FaceModel, point_row
-from fba.parameters import BAP_COUNT, bap_numbers
+from fba.face.model import FaceModel
+from fba.parameters import BAP_COUNT, bap_numbers, point_rows
 from fba.player import Camera, Offscreen, Scene
 from fba.tracks import BodyTrack
 from fba_player._figure.face import FaceFigure, build_figure
@@ -121,7 +121,7 @@ class Drawer:
         offscreen = self._open[case.size]
         offscreen.scene = scene
         if case.camera in NEAR:
-            _, y, z = scene.model.points[point_row(NEAR[case.camera])]
+            _, y, z = scene.model.points[point_rows()[NEAR[case.camera]]]
             offscreen.camera = Camera((0.0, float(y), float(z)), yaw=10.0, distance=0.25)
         else:
             offscreen.camera = scene.camera(case.camera or None, case.size[0] / case.size[1])

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import fba
-from fba.body import BapSolver, Skeleton
-from fba.body.stance import find_stance
+from fba.body import BapSolver, Skeleton, find_stance
 from fba.codec import EncoderOptions, decode
 from fba.errors import RangeError
 from fba.parameters import BAP_COUNT, baps

@@ -13,10 +13,9 @@ import pytest
 import fba
 from fba import Animation, EncoderOptions, FaceTrack
 from fba.errors import RangeError
-from fba.face import Deformer, FaceModel
+from fba.face import Deformer, FaceModel, resolve
 from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.deform.displacements import DisplacementMeter
-from fba.face.resolve import resolve
 from fba.parameters import faps
 from fba.planning import Tolerance, encode_planned, encode_within_tolerance
 from fba.planning._mesh_error import ErrorBasis

@@ -10,10 +10,10 @@ import pytest
 import fba
 from fba import Animation, EncoderOptions, FaceTrack
 from fba.codec import quantise
+from fba.face import FaceSettings, resolve
 from fba.face._expressions import Definitions
 from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.resolve import FaceSettings, resolve
 from fba.parameters import fap_numbers, faps
 from fba.planning import encode_planned, plan_compact
 from made_motion import LENGTH, made_animation

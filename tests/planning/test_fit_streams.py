@@ -11,8 +11,7 @@ import pytest
 from fba import Animation, EncoderOptions, FaceTrack
 from fba.codec import decode
 from fba.errors import ModelError, OptionError
-from fba.face import FaceModel, Function, InterpolationTable, Link, Term
-from fba.face.resolve import resolve
+from fba.face import FaceModel, Function, InterpolationTable, Link, Term, resolve
 from fba.parameters import faps
 from fba.planning import encode_planned
 from fba.planning.fit_streams import encode_with_fit

@@ -12,7 +12,7 @@ import pytest
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
 from fba.codec import Encoder, quantise
-from fba.face.resolve import resolve
+from fba.face import resolve
 from fba.parameters import bap_steps, baps
 from fba.planning import LiveEncoder
 from fba.tracks import hold

@@ -22,7 +22,7 @@ from fba.codec import (
 )
 from fba.encoder_options import PRESETS
 from fba.errors import FbaWarning, OptionError
-from fba.face.resolve import resolve, shown_faps
+from fba.face import resolve, shown_faps
 from fba.parameters import faps
 from fba.planning import encode_planned, plan_compact, plan_exact
 from fba.planning._segments import Cuts, cheapest_segments, find_cuts

@@ -15,7 +15,7 @@ from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
 from fba.capture.live import widest_faces
 from fba.codec import Encoder
 from fba.errors import OptionError, RangeError
-from fba.face.resolve import resolve
+from fba.face import resolve
 from fba.parameters import bap_steps, fap_steps
 from fba.planning.rate import LeakyBucket, RateEncoder, encode_at_rate, measure_errors
 from fba.planning.rate._encoder import TUNING

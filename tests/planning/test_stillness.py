@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import fba
-from fba.body import BapSolver
-from fba.body.stance import find_stance, sole_points
+from fba.body import BapSolver, find_stance
+from fba.body.stance import sole_points
 from fba.codec import EncoderOptions, decode, quantise, step_scale
 from fba.parameters import BAP_COUNT, bap_steps, baps
 from fba.planning import encode_planned, hold_still

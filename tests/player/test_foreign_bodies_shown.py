@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fba import Animation
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.formats.gltf.bodies import import_body
 from fba.parameters import fap_numbers
 from fba_player._figure.person import head_rows

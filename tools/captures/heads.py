@@ -12,8 +12,8 @@ import numpy.typing as npt
 from fba.arrays import Float64
 from fba.face import FaceModel
 from fba.face.authoring import author
-from fba.face.feature_points import row_of
 from fba.face.importers import import_model
+from fba.parameters import point_rows
 
 SIZE = (1.05, 1.0, 0.95)
 """The other head is wider and flatter than the built-in one."""
@@ -33,7 +33,7 @@ def other_head() -> FaceModel:
     for 10.8). It takes some seconds.
     """
     model = FaceModel.default()
-    rows, points = row_of(), model.points
+    rows, points = point_rows(), model.points
     eyes = [
         points[[rows[upper], rows[lower]]].mean(axis=0) for upper, lower in (("3.1", "3.3"), ("3.2", "3.4"))
     ]

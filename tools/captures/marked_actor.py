@@ -18,8 +18,7 @@ from fba.capture.markers._faces import PATH
 from fba.capture.markers._targets import TRAGIONS
 from fba.capture.markers.marker_maps import marker_sets
 from fba.face import Deformer, FaceModel
-from fba.face.feature_points import row_of
-from fba.parameters import BAP_COUNT
+from fba.parameters import BAP_COUNT, point_rows
 from fba.tracks import BodyTrack, FaceTrack
 from tools.captures.performances import HEAD, head_motion, speech
 
@@ -64,7 +63,7 @@ def record(model: FaceModel, faps: Float64, rate: int = 100, seed: int = 2) -> T
     faps = faps.copy()
     faps[:, HEAD] = angles / model.fapu.AU
     points = Deformer(model).feature_points(faps) + path[:, None]
-    rows, places = row_of(), marker_sets()["regions50"]
+    rows, places = point_rows(), marker_sets()["regions50"]
     positions = np.zeros((len(faps), len(NAMES), 3))
     for n, name in enumerate(NAMES):
         target = places[name.lower()]

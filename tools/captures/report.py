@@ -10,8 +10,7 @@ import numpy as np
 import fba
 from fba.arrays import Float64
 from fba.capture import ShapeMotion, from_blendshapes, to_blendshapes
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER
-from fba.face import FaceModel
+from fba.face import FaceModel, arkit_names
 from fba.formats import format_of
 from fba.formats.face_tables import _livelink_csv as livelink_csv
 from fba.formats.face_tables import livelink_udp
@@ -86,15 +85,15 @@ def shapes_table(recordings: Iterable[Path]) -> str:
     """
     before: list[Float64] = []
     after: list[Float64] = []
-    largest = np.zeros(len(ARKIT_ORDER))
+    largest = np.zeros(len(arkit_names()))
     for path in recordings:
         motion = read_shapes(path)
         animation = from_blendshapes(motion)
         seen, at = motion.seen, animation.index / float(animation.rate)
-        weights = np.zeros((len(at), len(ARKIT_ORDER)))
+        weights = np.zeros((len(at), len(arkit_names())))
         for name, values in zip(motion.names, motion.weights[seen].T, strict=True):
-            if name in ARKIT_ORDER:
-                weights[:, ARKIT_ORDER.index(name)] = np.interp(at, motion.times[seen], values)
+            if name in arkit_names():
+                weights[:, arkit_names().index(name)] = np.interp(at, motion.times[seen], values)
         largest = np.maximum(largest, weights.max(axis=0))
         before.append(weights - weights.mean(axis=0))
         back = to_blendshapes(animation).weights
@@ -102,7 +101,7 @@ def shapes_table(recordings: Iterable[Path]) -> str:
     one, other = np.concatenate(before), np.concatenate(after)
     powers = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
     rows = [["shape", "correlation", "largest weight"]]
-    for number, name in enumerate(ARKIT_ORDER):
+    for number, name in enumerate(arkit_names()):
         power = float(powers[number])
         told = f"{float(one[:, number] @ other[:, number]) / power:.3f}" if power > STILL else NOT_TOLD
         rows.append([name, told, f"{largest[number]:.2f}"])

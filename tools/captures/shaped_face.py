@@ -16,8 +16,8 @@ import fba
 from fba.animation import Animation
 from fba.arrays import Float64
 from fba.capture import ActionUnitMotion, ShapeMotion, from_action_units, from_blendshapes
-from fba.capture.sampling import find_rate
 from fba.rotations import axis_matrices
+from fba.sampling import find_rate
 from tools.captures import face_files
 
 SIZES = {

@@ -17,7 +17,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture import PointMotion
 from fba.face import Deformer, FaceModel
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
 from tools.captures.performances import head_motion, speech
 
 Spot = tuple[tuple[str, float], ...]
@@ -130,7 +130,7 @@ def film(
     faps[:, [fap - 1 for fap in GAZE[2:]]] = (12_000 * start * np.sin(2.9 * times))[:, None]
     faps[:, [fap - 1 for fap in without]] = 0.0
     points = Deformer(model).feature_points(faps).astype(np.float64) + path[:, None]
-    rows = row_of()
+    rows = point_rows()
     world = np.repeat(points[:, None, rows["7.1"]], count, axis=1)
     for number, spot in spots(count).items():
         world[:, number] = sum(points[:, rows[name]] * part for name, part in spot)

@@ -8,7 +8,7 @@ from person import Person
 
 from fba.arrays import Float64
 from fba.body import Skeleton
-from fba.easing import smoothstep
+from fba.sampling import smoothstep
 
 HINGES = (
     ("?_shoulder", "?_elbow", "?_wrist", (0.0, 0.0, 1.0), 0.040, 0.046),

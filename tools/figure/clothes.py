@@ -16,8 +16,8 @@ from scipy.interpolate import PchipInterpolator
 
 from fba.arrays import Bool, Float64, Int64
 from fba.body import Skeleton
-from fba.easing import smoothstep
 from fba.mesh import vertex_normals
+from fba.sampling import smoothstep
 
 EdgeDistance = Callable[[Float64, Float64], Float64]
 

@@ -11,8 +11,8 @@ from subdivide import refine
 
 import figure
 from fba.arrays import Float64, Int64
-from fba.easing import smoothstep
 from fba.mesh import vertex_normals
+from fba.sampling import smoothstep
 
 COLOUR = np.array([0.052, 0.088, 0.125])
 """Linear light."""

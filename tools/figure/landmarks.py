@@ -12,7 +12,8 @@ from subdivide import Refined
 
 from fba.arrays import Bool, Float64, Int32
 from fba.face import feature_point_names as names
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
+from fba.parameters import point_rows
 
 HERE = Path(__file__).parent
 
@@ -37,7 +38,7 @@ def bound_points(
             if name in MIRRORED:
                 pair.append((MIRRORED[name], place, -1.0))
             for point, target, side in pair:
-                number = row_of()[point]
+                number = point_rows()[point]
                 if row["rule"] == "free":
                     points[number] = target / 1000
                 elif part == "skin":

@@ -22,14 +22,14 @@ from sculpt import ORIGIN
 
 import figure
 from fba.arrays import Bool, Float64, Int64
-from fba.body import BodyModel, Skeleton
-from fba.body.model import BodyPart, Material
+from fba.body import BodyModel, BodyPart, Skeleton
+from fba.body._model import Material
 from fba.body.skin.skin_weights import strongest_weights
 from fba.body.solve._bind_pose import FINGERS
-from fba.easing import smoothstep
 from fba.face import FaceModel
-from fba.face.model import point_row
 from fba.mesh import vertex_normals
+from fba.parameters import point_rows
+from fba.sampling import smoothstep
 from fba_player._figure.occlusion import bake
 
 TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
@@ -199,7 +199,7 @@ def model() -> BodyModel:
                 material=Material(name, (1.0, 1.0, 1.0), roughness),
             )
         )  # fmt: skip
-    points = FaceModel.default().points[[point_row("3.5"), point_row("3.6")]]
+    points = FaceModel.default().points[[point_rows()["3.5"], point_rows()["3.6"]]]
     notes = {
         "origin": "derived from the neutral figure of SOMA-X (NVIDIA) as carried by the package anny 0.6.2",
         "licence": "Apache-2.0",

@@ -25,10 +25,10 @@ from subdivide import Refined, refine
 
 import figure
 from fba.arrays import Float64, Int32
-from fba.easing import smoothstep
 from fba.face import FaceModel, Material, Part, compact
 from fba.face.authoring import author
 from fba.mesh import vertex_normals
+from fba.sampling import smoothstep
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"

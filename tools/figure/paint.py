@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFilter
 from scipy.interpolate import PchipInterpolator
 
 from fba.arrays import Bool, Float64, Integer
-from fba.easing import smoothstep
+from fba.sampling import smoothstep
 
 SIZE = 2048
 

@@ -15,7 +15,7 @@ from subdivide import refine
 
 import figure
 from fba.arrays import Bool, Float64, Int64
-from fba.easing import smoothstep
+from fba.sampling import smoothstep
 
 WIDER = 0.024
 """Metres by which each shoulder is moved out: joints 0.37 m apart, average for adults of this height."""

@@ -25,7 +25,7 @@ from fba.body.solve._bind_pose import (
     skeleton_in_default_posture,
     vertebrae_between,
 )
-from fba.easing import smoothstep
+from fba.sampling import smoothstep
 
 HERE = Path(__file__).parent
 SKULLBASE = np.array([0.0, 1.6182, -0.0177])

@@ -13,7 +13,7 @@ import numpy as np
 from subdivide import Refined
 
 from fba.arrays import Bool, Float64, Int64
-from fba.easing import smoothstep
+from fba.sampling import smoothstep
 from figure import Surface
 
 EYE_CENTRE = np.array([0.0312, -0.0018, 0.0620])

@@ -7,8 +7,8 @@ from clothes import MIRROR, Garment
 from meshes import tube
 
 from fba.arrays import Float64, Int64
-from fba.easing import smoothstep
 from fba.mesh import vertex_normals
+from fba.sampling import smoothstep
 
 LEATHER = np.array([0.030, 0.026, 0.024])
 SOLE = np.array([0.42, 0.41, 0.39])

@@ -7,7 +7,7 @@ from importlib.resources import as_file, files
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fba.body.model import BodyModel
+    from fba.body._model import BodyModel
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.arrays import Float64, Int32
-from fba.body.skeleton import ROOT, Skeleton
+from fba.body._skeleton import ROOT, Skeleton
 from fba.body.solve.conventions import convention
 from fba.choices import Axes
 from fba.errors import ModelError

@@ -17,10 +17,10 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Float64
+from fba.body._skeleton import Skeleton
 from fba.body.gait._anatomy import Anatomy, body_values
 from fba.body.gait._characters import POSES
 from fba.body.gait._measure import sole_points
-from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
 from fba.choices import Axes
 

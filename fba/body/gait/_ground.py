@@ -13,8 +13,8 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.body.gait._anatomy import Side, foot_angles, limb_angles
-from fba.easing import smoothstep
 from fba.rotations import apply, axis_matrices
+from fba.sampling import smoothstep
 
 _ROUNDS = 4
 """Rounds in which the roll of the subtalar joint and the turn of the foot settle."""

@@ -16,9 +16,9 @@ from fba.body.gait._anatomy import Anatomy, Side, limb_angles
 from fba.body.gait._characters import CYCLE, PHASES, Character
 from fba.body.gait._curves import Interpolation, cosine_wave, periodic_curve, spline
 from fba.body.gait._ground import Footing, Leg
-from fba.easing import smoothstep
 from fba.errors import ModelError
 from fba.rotations import axis_matrices
+from fba.sampling import smoothstep
 
 KNOTS = np.array([*PHASES, *(phase + 0.5 for phase in PHASES)])
 MIN_STRIDE = 0.1

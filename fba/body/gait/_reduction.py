@@ -11,10 +11,10 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64, Int32
+from fba.body._skeleton import Skeleton
 from fba.body.gait._anatomy import body_values
 from fba.body.gait._curves import Interpolation
 from fba.body.gait._detection import Gait, detect
-from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver, wrapped
 from fba.parameters import baps
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float64
+from fba.body._skeleton import Skeleton
 from fba.body.gait import _ground as ground
 from fba.body.gait._anatomy import Anatomy, Side, Writer, limb_angles
 from fba.body.gait._characters import Character
 from fba.body.gait._curves import Interpolation, check_interpolation, cosine_wave, periodic_curve
 from fba.body.gait._plan import KNOTS, MIN_STRIDE, Plan, make_plan
-from fba.body.skeleton import Skeleton
 from fba.body.solve.solver import BapSolver
 from fba.errors import ModelError
 

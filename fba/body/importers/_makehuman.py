@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int64
-from fba.body.model import BodyModel, BodyPart, Material
-from fba.body.skeleton import Skeleton
+from fba.body._model import BodyModel, BodyPart, Material
+from fba.body._skeleton import Skeleton
 from fba.body.skin.skin_weights import strongest_weights
 from fba.body.solve._bind_pose import (
     bind_matrices,
@@ -26,10 +26,10 @@ from fba.body.solve._bind_pose import (
     skeleton_in_default_posture,
     vertebrae_between,
 )
-from fba.easing import smoothstep
 from fba.errors import FormatError, ModelError
 from fba.gltf import MAX_ITEMS, Value, parse_json
 from fba.mesh import Polygons, connected, read_obj, triangulate, vertex_normals
+from fba.sampling import smoothstep
 from fba.text_files import packaged_rows, read_bytes
 
 METRES = 0.1

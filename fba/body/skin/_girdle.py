@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.skeleton import Skeleton
+from fba.body._skeleton import Skeleton
 from fba.compiled import compiled, inlined
-from fba.easing import smoothstep, smoothstep_of_one
+from fba.sampling import smoothstep
 
 CHAIN = ("sternoclavicular", "acromioclavicular", "shoulder", "elbow")
 LIFT = 0.16
@@ -111,6 +111,13 @@ def turn_girdles(duals: Float32, girdle: Girdle) -> None:
         angle = wanted - min(max(turned, 0.0), wanted)
         _turn(duals, outer, angle, cx, cy, cz, centre)
         _turn(duals, inner, 0.5 * angle, cx, cy, cz, centre)
+
+
+@inlined
+def smoothstep_of_one(value: float) -> float:
+    """Return `smoothstep` of a single number, for compiled loops."""
+    t = min(max(value, 0.0), 1.0)
+    return t * t * (3.0 - 2.0 * t)
 
 
 @inlined

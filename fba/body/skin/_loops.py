@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.skin._girdle import Girdle, straighten_armpits, turn_girdles
+from fba.body.skin._girdle import Girdle, smoothstep_of_one, straighten_armpits, turn_girdles
 from fba.compiled import compiled, inlined
-from fba.easing import smoothstep_of_one
 
 
 class Twisting(NamedTuple):

@@ -15,14 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32, Int64
-from fba.body.skeleton import Skeleton
+from fba.body._skeleton import Skeleton
 from fba.body.skin import _loops as loops
 from fba.body.skin._girdle import Girdle, find_girdle
 from fba.body.skin._loops import Twisting
 from fba.body.skin._moving_normals import normal_rings
 from fba.choices import SkinMethod
-from fba.easing import smoothstep
 from fba.mesh import result_array
+from fba.sampling import smoothstep
 
 METHODS: tuple[SkinMethod, ...] = get_args(SkinMethod)
 """Ways to blend the motion of several joints."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float64
-from fba.body.skeleton import Skeleton
+from fba.body._skeleton import Skeleton
 from fba.parameters import joints
 
 FINGERS = ("index", "middle", "ring", "pinky")

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float64, Int32, Int64
-from fba.body.skeleton import Skeleton
+from fba.body._skeleton import Skeleton
 from fba.body.solve import _pose_loops as pose_loops
 from fba.body.solve import solver_loops
 from fba.body.solve.conventions import NO_BAP, Convention, convention

@@ -7,5 +7,13 @@ from fba.capture.blendshapes._inversion import to_blendshapes
 from fba.capture.blendshapes._motion import ActionUnitMotion, ShapeMotion
 from fba.capture.blendshapes.action_units import from_action_units
 from fba.capture.blendshapes.conversion import from_blendshapes
+from fba.capture.blendshapes.shape_table import shape_faps
 
-__all__ = ["ActionUnitMotion", "ShapeMotion", "from_action_units", "from_blendshapes", "to_blendshapes"]
+__all__ = [
+    "ActionUnitMotion",
+    "ShapeMotion",
+    "from_action_units",
+    "from_blendshapes",
+    "shape_faps",
+    "to_blendshapes",
+]

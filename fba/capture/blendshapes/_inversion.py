@@ -12,10 +12,10 @@ from fba.arrays import Float64
 from fba.capture.blendshapes._motion import ShapeMotion
 from fba.capture.blendshapes.combination import CLOSED, JAW, RADIAN
 from fba.capture.blendshapes.conversion import EYE_FAPS, HEAD_FAPS
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
+from fba.capture.blendshapes.shape_table import shape_faps
 from fba.compiled import compiled
 from fba.errors import ModelError
-from fba.face import Fapu, neutral_points, resolve
+from fba.face import Fapu, arkit_names, neutral_points, resolve
 from fba.parameters import FAP_COUNT, fap_numbers, faps
 
 EYEBALL_RADIUS = 0.012
@@ -29,7 +29,7 @@ SHARED_WEIGHT = 5e-4
 alike, as real faces do, and keeps shapes out of movements too small to see."""
 
 
-def to_blendshapes(animation: Animation, names: tuple[str, ...] = ARKIT_ORDER) -> ShapeMotion:
+def to_blendshapes(animation: Animation, names: tuple[str, ...] | None = None) -> ShapeMotion:
     """Return weights of ARKit's 52 shapes, 0 to 1, that show a face like its FAPs, and head and eyes.
 
     names: of other shapes with known FAPs, such as "aa" and "happy" of VRM.
@@ -40,6 +40,7 @@ def to_blendshapes(animation: Animation, names: tuple[str, ...] = ARKIT_ORDER) -
 
     Raises ModelError without a face, or for a shape whose FAPs are not known.
     """
+    names = arkit_names() if names is None else names
     if animation.face is None or not len(animation):
         raise ModelError("the animation has no face; there is nothing to make blendshapes of")
     shown = resolve(animation.face).astype(np.float64)
@@ -63,7 +64,7 @@ def _shapes(names: tuple[str, ...]) -> Float64:
 
     "mouthClose" is there an open jaw with lips together, since it does nothing beyond "jawOpen".
     """
-    rows = {name: amounts for name in names if (amounts := amounts_of(name)) is not None}
+    rows = {name: amounts for name in names if (amounts := shape_faps(name)) is not None}
     unknown = [name for name in names if name not in rows]
     if unknown:
         raise ModelError(f"no FAPs are known for the shape {unknown[0]!r}")
@@ -81,7 +82,7 @@ def _metres(names: tuple[str, ...]) -> Float64:
         metres[fap_numbers()[name] - 1] = EYEBALL_RADIUS / RADIAN
     moved = np.zeros(FAP_COUNT, dtype=bool)
     for name in names:
-        amounts = amounts_of(name)
+        amounts = shape_faps(name)
         moved |= amounts != 0 if amounts is not None else False
     return np.where(moved, metres, 0.0)
 

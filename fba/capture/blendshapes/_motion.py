@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.sampling import find_gaps
 from fba.errors import ModelError
+from fba.sampling import find_gaps
 from fba.tracks import freeze
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from fba.animation import Animation
 from fba.capture.blendshapes._motion import ActionUnitMotion, ShapeMotion
 from fba.capture.blendshapes.conversion import from_blendshapes
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import ModelError
+from fba.face import arkit_names
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import read_table
+from fba.text_files import packaged_rows
 
 
 def from_action_units(
@@ -35,7 +35,7 @@ def to_shapes(motion: ActionUnitMotion) -> ShapeMotion:
     if not known:
         units = ", ".join(map(str, motion.units)) or "no unit"
         raise ModelError(f"no action unit is known here: {units}")
-    used = [name for name in ARKIT_ORDER if any(name in unit_shapes()[unit] for unit in known)]
+    used = [name for name in arkit_names() if any(name in unit_shapes()[unit] for unit in known)]
     weights = np.zeros((len(motion), len(used)))
     for column, unit in enumerate(motion.units):
         for name, share in unit_shapes().get(unit, {}).items():
@@ -50,7 +50,7 @@ def to_shapes(motion: ActionUnitMotion) -> ShapeMotion:
 def unit_shapes() -> dict[int, Mapping[str, float]]:
     """Return weights of ARKit's shapes by name, for each action unit at full intensity, by its number."""
     table: dict[int, Mapping[str, float]] = {}
-    for row in read_table(__package__, "unit_shapes.csv"):
+    for row in packaged_rows(__package__, "unit_shapes.csv"):
         shapes = {}
         for entry in row["shapes"].split():
             name, _, share = entry.partition("=")

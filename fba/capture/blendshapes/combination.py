@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.blendshapes.shape_table import amounts_of, key_of, with_mates
+from fba.capture.blendshapes.shape_table import shape_faps, with_mates
+from fba.face import arkit_of
 from fba.face.gaze import limit_gaze
-from fba.face.shape_names import arkit_of
+from fba.name_maps import key_of
 from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack
 
@@ -33,7 +34,7 @@ def combine(weights: Mapping[str, Float64], count: int, *, but: Bool | None = No
     count: T. Unknown names are left out. but: mask (68,) of FAPs that something else moves. "mouthClose"
     brings the lips of an open jaw together: it counts up to the weight of "jawOpen", and not without it.
     """
-    known = {name: amounts for name in weights if (amounts := amounts_of(name)) is not None}
+    known = {name: amounts for name in weights if (amounts := shape_faps(name)) is not None}
     if not known:
         return np.zeros((count, FAP_COUNT)), np.zeros(FAP_COUNT, dtype=bool)
     columns = [weights[name] for name in known]

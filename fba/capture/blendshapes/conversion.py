@@ -11,10 +11,10 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64
 from fba.capture.blendshapes._motion import ShapeMotion
 from fba.capture.blendshapes.combination import RADIAN, combine, to_face_track
-from fba.capture.sampling import frame_numbers, interpolate
 from fba.errors import ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import FAP_COUNT, fap_numbers
+from fba.sampling import frame_numbers, interpolate
 from fba.tracks import FaceTrack
 
 FRAME_BYTES = 1500

@@ -14,30 +14,16 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.face import Definitions
+from fba.face import Definitions, arkit_of
 from fba.face.gltf.morphs import morph_values
-from fba.face.shape_names import arkit_of, fap_of
-from fba.name_maps import both_sides
+from fba.face.shape_names import fap_of
+from fba.name_maps import both_sides, key_of
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
-from fba.source import read_table
-
-ARKIT_ORDER = tuple(
-    """
-    eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft eyeWideLeft
-    eyeBlinkRight eyeLookDownRight eyeLookInRight eyeLookOutRight eyeLookUpRight eyeSquintRight eyeWideRight
-    jawForward jawLeft jawRight jawOpen mouthClose mouthFunnel mouthPucker mouthLeft mouthRight
-    mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight mouthDimpleLeft mouthDimpleRight
-    mouthStretchLeft mouthStretchRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper
-    mouthPressLeft mouthPressRight mouthLowerDownLeft mouthLowerDownRight mouthUpperUpLeft mouthUpperUpRight
-    browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft
-    cheekSquintRight noseSneerLeft noseSneerRight tongueOut
-    """.split()  # noqa: SIM905 - fifty lines otherwise
-)
-"""ARKit's 52 shapes in the order of ARKit's and Live Link Face's own data."""
+from fba.text_files import packaged_rows
 
 
 @cache
-def amounts_of(name: str) -> Float64 | None:
+def shape_faps(name: str) -> Float64 | None:
     """Return FAPs (68,) of the shape of this name at weight 1; None for an unknown name."""
     number = fap_of(name)
     if number is not None:
@@ -67,16 +53,11 @@ def with_mates(sent: Bool) -> Bool:
     return result
 
 
-def key_of(name: str) -> str:
-    """Return the letters and digits of a name, in lower case."""
-    return re.sub(r"[^a-z0-9]", "", name.lower())
-
-
 @cache
 def _table() -> dict[str, Float64]:
     """Return FAPs (68,) at weight 1 by the key of each shape's name."""
     table: dict[str, Float64] = {}
-    for row in read_table(__package__, "shape_faps.csv"):
+    for row in packaged_rows(__package__, "shape_faps.csv"):
         for side, name in both_sides(row["shape"]):
             table[key_of(name)] = _amounts((row["faps"] or "").replace("?", side))
     return table

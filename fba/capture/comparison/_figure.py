@@ -9,8 +9,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Array, Float64
-from fba.body import SIDES, BapSolver
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, SIDES, BapSolver
 from fba.capture.motion import SkeletonMotion, read_axis
 from fba.geometry import nearest_rotation
 from fba.rotations import unit

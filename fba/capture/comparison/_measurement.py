@@ -11,9 +11,7 @@ from scipy.ndimage import minimum_filter1d
 
 from fba.animation import Animation
 from fba.arrays import Array, Float64
-from fba.body import SIDES, BapSolver, BodyModel, Skeleton
-from fba.body.footing import GroundedPoser
-from fba.body.model import BodyPart
+from fba.body import SIDES, BapSolver, BodyModel, BodyPart, GroundedPoser, Skeleton
 from fba.capture.comparison import _figure as figure
 from fba.capture.comparison import _path_measures as path_measures
 from fba.capture.comparison import _pose_measures as pose_measures

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.body import SIDES
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, SIDES
 from fba.capture.comparison._figure import Figure, degrees_turned
 from fba.capture.comparison._pose_measures import LIMBS, TURNING, WORDS, Row
 from fba.capture.comparison._standing import foot_points

@@ -12,8 +12,7 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Bool, Float64
-from fba.body import SIDES
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, SIDES
 from fba.capture.comparison._figure import Figure, degrees_turned, mean_rotation
 from fba.rotations import degrees_between, unit
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from fba.source import read_table
+from fba.text_files import packaged_rows
 
 GRADES = ("good", "fair", "poor")
 
@@ -31,7 +31,7 @@ class Bounds:
 def bounds() -> dict[str, Bounds]:
     """Return the bounds by measure."""
     result = {}
-    for row in read_table(__package__, "thresholds.csv"):
+    for row in packaged_rows(__package__, "thresholds.csv"):
         hold, fair, poor = (float(row[name]) for name in ("hold", "fair", "poor"))
         name = row["measure"]
         result[name] = Bounds(name, row["unit"], hold, fair, poor, row["says"], row["phrase"])

@@ -4,6 +4,6 @@ May use: parameters, the face, and the modules of `fba` itself.
 """
 
 from fba.capture.markers._faces import find_face, from_markers
-from fba.capture.markers.motion import MarkerMotion
+from fba.capture.markers._motion import MarkerMotion
 
 __all__ = ["MarkerMotion", "find_face", "from_markers"]

@@ -3,32 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
 import numpy as np
 
 from fba.arrays import Float64
 from fba.capture.markers._targets import LOWER_LIDS, PUPILS
-from fba.face.feature_points import row_of
 from fba.face.gaze import LARGEST_GAZE
+from fba.parameters import point_rows
 
-MAX_BLINK = 0.5
-"""Longest duration of a blink at half its depth, in seconds."""
-MIN_BLINK_DEPTH = 0.5
-"""Smallest depth of a blink, as a share of the usual opening of the eye."""
-UPPER_LID_SHARE = 0.95
-"""Share of the opening by which the upper lid sinks in a blink. The lower lid rises to meet it on four heads
-with ARKit's shapes (0.90 there, fba/capture/blendshapes/shape_faps.csv), and hardly in streams of old
-encoders; as it is not sent, a blink must nearly close the eye without it."""
-OPENING_RANGE = (0.7, 1.3)
-"""Smallest and largest opening that is accepted, relative to the usual opening."""
-SMOOTHING_SECONDS = 0.02
-"""Length of the moving average that removes noise, in seconds."""
-DEPTH_PERCENTILE = 75
-"""Percentile of the blinks' depths: while people talk, many blinks stop half-way."""
-EYEBALL_RADIUS = 0.01205
-"""Metres from the centre of an adult's eyeball to its front, which is nearly the same in all adults."""
-MIN_OPENING = 0.3
-"""Share of its neutral opening that an eye must exceed for its pupil to be seen."""
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of lids and blinks."""
+
+    max_blink: float = 0.5  # longest duration of a blink at half its depth, in seconds
+    min_blink_depth: float = 0.5  # depth of a blink, as a share of the usual opening of the eye
+    # share of the opening by which the upper lid sinks in a blink. The lower lid rises to meet it on four
+    # heads with ARKit's shapes (0.90 there, fba/capture/blendshapes/shape_faps.csv), and hardly in streams of
+    # old encoders; as it is not sent, a blink must nearly close the eye without it.
+    upper_lid_share: float = 0.95
+    opening_range: tuple[float, float] = (0.7, 1.3)  # accepted openings, relative to the usual
+    smoothing_seconds: float = 0.02  # length of the moving average that removes noise, in seconds
+    depth_percentile: int = 75  # of the depths of blinks: while people talk, many stop half-way
+    eyeball_radius: float = 0.01205  # metres from an eyeball's centre to its front; adults hardly differ
+    min_opening: float = 0.3  # share of its neutral opening that an eye must exceed for its pupil to be seen
+
+
+TUNING = Tuning()
 
 
 def opening_by_blinks(sunk: Float64, times: Float64, usual: float) -> float | None:
@@ -44,13 +46,15 @@ def opening_by_blinks(sunk: Float64, times: Float64, usual: float) -> float | No
         return None
     rate = (len(times) - 1) / float(times[-1] - times[0])
     depths: list[float] = []
-    for lid in uniform_filter1d(sunk, max(1, round(SMOOTHING_SECONDS * rate)), axis=0).T:
-        peaks, _ = find_peaks(lid, prominence=MIN_BLINK_DEPTH * usual, width=(None, MAX_BLINK * rate))
+    for lid in uniform_filter1d(sunk, max(1, round(TUNING.smoothing_seconds * rate)), axis=0).T:
+        peaks, _ = find_peaks(
+            lid, prominence=TUNING.min_blink_depth * usual, width=(None, TUNING.max_blink * rate)
+        )
         depths += lid[peaks].tolist()
     if not depths:
         return None
-    opening = float(np.percentile(depths, DEPTH_PERCENTILE)) / UPPER_LID_SHARE
-    return float(np.clip(opening, OPENING_RANGE[0] * usual, OPENING_RANGE[1] * usual))
+    opening = float(np.percentile(depths, TUNING.depth_percentile)) / TUNING.upper_lid_share
+    return float(np.clip(opening, TUNING.opening_range[0] * usual, TUNING.opening_range[1] * usual))
 
 
 def find_gaze(moved: Float64, points: Float64, places: Collection[str], size: float) -> Float64 | None:
@@ -66,7 +70,7 @@ def find_gaze(moved: Float64, points: Float64, places: Collection[str], size: fl
         return None
     total, weight = np.zeros((len(moved), 2)), np.zeros(len(moved))
     for name in pupils:
-        shift = moved[:, row_of()[name]] / (EYEBALL_RADIUS * size)
+        shift = moved[:, point_rows()[name]] / (TUNING.eyeball_radius * size)
         most = np.sin(LARGEST_GAZE)
         pitch = -np.arcsin(np.clip(shift[:, 1], -most, most))
         yaw = np.arcsin(np.clip(shift[:, 0] / np.cos(pitch), -most, most))
@@ -86,7 +90,7 @@ def _open(moved: Float64, points: Float64, pupil: str, places: Collection[str]) 
     upper, lower = list(LOWER_LIDS.items())[PUPILS.index(pupil)]
     if not {upper, lower} <= set(places):
         return np.ones(len(moved))
-    above, below = row_of()[upper], row_of()[lower]
+    above, below = point_rows()[upper], point_rows()[lower]
     neutral = points[above, 1] - points[below, 1]
     opening = neutral + moved[:, above, 1] - moved[:, below, 1]
-    return np.asarray((opening > MIN_OPENING * neutral).astype(np.float64))
+    return np.asarray((opening > TUNING.min_opening * neutral).astype(np.float64))

@@ -15,22 +15,21 @@ from fba.arrays import Float64, Intp
 from fba.capture.markers._exchanges import Exchange, undo_exchanges
 from fba.capture.markers._eyes import find_gaze, opening_by_blinks
 from fba.capture.markers._gaps import Filled, fill_gaps, often_seen, warn_of_gaps
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._neutral import neutral_frames
 from fba.capture.markers._registration import GIVE_MAP, Registration, complete_points, register
 from fba.capture.markers._solving import choose_unknowns, measure_responses, solve
 from fba.capture.markers._stabilisation import follow_head, relate_poses, remove_poses
 from fba.capture.markers._targets import LOWER_LIDS, PUPILS, RIGID
 from fba.capture.markers.marker_maps import check_map, find_map
-from fba.capture.markers.motion import MarkerMotion
 from fba.choices import Gaze
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel, Fapu
-from fba.face.feature_points import row_of
 from fba.face.gaze import limit_gaze
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, PITCH_EYE, YAW_EYE
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import list_names
-from fba.parameters import BAP_COUNT, FAP_COUNT
+from fba.parameters import BAP_COUNT, FAP_COUNT, point_rows
 from fba.tracks import BodyTrack, FaceTrack
 
 PATH = (181, 182, 183)
@@ -189,7 +188,7 @@ def find_face(
     values, sent = _solve_features(actor, moved, points, fapu, model, traits)
     sent += _turn_head(values, actor, fapu, traits)
     sent += _turn_eyes(values, actor, moved, points, fapu, gaze)
-    spine = points[row_of()["7.1"]]
+    spine = points[point_rows()["7.1"]]
     path = np.einsum("tcd,d->tc", actor.rotation, spine) + actor.shift - spine
     return MarkerFace(
         actor.places, found_by, actor.registration, (actor.rest.start, actor.rest.stop), points, fapu,
@@ -304,7 +303,7 @@ def _measure_points(
     points = complete_points(placed, model.points)
     _open_by_blinks(points, actor.places, names, local - neutral, times)
     moved = np.zeros((len(local), len(points), 3))
-    rows = row_of()
+    rows = point_rows()
     for n, place in enumerate(actor.places.values()):
         if place in rows:
             moved[:, rows[place]] = local[:, n] - neutral[n]
@@ -315,7 +314,7 @@ def _solve_features(
     actor: _Actor, moved: Float64, points: Float64, fapu: Fapu, model: FaceModel, traits: Traits
 ) -> tuple[Float64, tuple[int, ...]]:
     """Return the FAPs of all frames, float64 (T, 68), and those that the markers of the face show."""
-    rows = row_of()
+    rows = point_rows()
     moving = [place for place in actor.places.values() if place in rows and place not in (*RIGID, *PUPILS)]
     unknowns = choose_unknowns(moving, traits.depth, traits.untold)
     if not unknowns.faps:
@@ -352,7 +351,7 @@ def _open_by_blinks(
     points: Float64, places: Mapping[str, str], names: Sequence[str], moved: Float64, times: Float64
 ) -> None:
     """Move lower lids without markers to where blinks show them, in points, float64 (84, 3)."""
-    rows, placed = row_of(), {places[name]: n for n, name in enumerate(names)}
+    rows, placed = point_rows(), {places[name]: n for n, name in enumerate(names)}
     lids = {upper: lower for upper, lower in LOWER_LIDS.items() if upper in placed and lower not in placed}
     if not lids:
         return

@@ -6,41 +6,41 @@ markers near a feature point get it.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fba.arrays import Float64
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._registration import GIVE_MAP, SIZE_RANGE, UNIT_FACTORS
 from fba.capture.markers._targets import PUPILS, SKULL, target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.geometry import fit_similarity
 from fba.rotations import axis_matrices
 
-MIN_MARKERS = 12
-"""Smallest number of markers whose shape identifies a face."""
-DIRECTIONS = 12
-"""Number of directions about the vertical from which the cloud is laid onto the head."""
-FIRST_ITERATIONS = 6
-"""Number of iterations of the fit from each direction."""
-FULL_FITS = 6
-"""Number of best fits that are completed."""
-ITERATIONS = 25
-"""Number of further iterations of these."""
-MAX_POINT_DISTANCE = 0.014
-"""Largest distance of a marker from its feature point, in metres."""
-MIN_PLACED = 0.4
-"""Smallest share of the markers that must be near feature points."""
-MAX_ERROR = 0.006
-"""Largest root mean square distance, in metres, of the cloud of a face."""
 RARE_POINTS = (*(f"2.{n}" for n in range(2, 10)), *(f"3.{n}" for n in range(7, 15)), "8.9", "8.10", "9.4",
                "9.5", "9.6", "9.7", "9.13", "9.14", "11.4", "11.6")  # fmt: skip
 """Points that hardly anybody marks, such as those inside the lips, beside points that many mark."""
-MIN_DEPTH = -0.09
-"""Smallest z, in metres, of the head's surface that carries markers."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the proposal of places for markers."""
+
+    min_markers: int = 12  # number of markers whose shape identifies a face
+    directions: int = 12  # number of directions about the vertical from which the cloud is laid onto the head
+    first_iterations: int = 6  # number of iterations of the fit from each direction
+    full_fits: int = 6  # number of best fits that are completed
+    iterations: int = 25  # number of further iterations of these
+    max_point_distance: float = 0.014  # distance of a marker from its feature point, in metres
+    min_placed: float = 0.4  # share of the markers that must be near feature points
+    max_error: float = 0.006  # root mean square distance, in metres, of the cloud of a face
+    min_depth: float = -0.09  # z, in metres, of the head's surface that carries markers
+
+
+TUNING = Tuning()
 
 
 def propose_map(motion: MarkerMotion) -> dict[str, str]:
@@ -51,7 +51,7 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
     usual = seen.mean(axis=0) > 0.5
     frame = int(seen[:, usual].sum(axis=1).argmax()) if usual.any() else 0
     rows = np.flatnonzero(seen[frame])
-    if len(rows) < MIN_MARKERS:
+    if len(rows) < TUNING.min_markers:
         raise ModelError(
             f"no built-in set has the names of these markers, and {len(rows)} are too few to find a face by "
             "its shape"
@@ -59,7 +59,7 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
     model = FaceModel.default()
     cloud = motion.positions[frame, rows]
     laid, error = _lay_onto(cloud, model, motion.up)
-    if error > MAX_ERROR:
+    if error > TUNING.max_error:
         raise ModelError(
             "no built-in set has the names of these markers, and their shape is not that of a face "
             f"(best fit {1000 * error:.0f} mm off)"
@@ -67,13 +67,13 @@ def propose_map(motion: MarkerMotion) -> dict[str, str]:
     places = _skin_points(model)
     names = [name for name in places if name not in RARE_POINTS]
     apart = np.linalg.norm(laid[:, None] - np.array([places[name] for name in names])[None], axis=2)
-    markers, targets = linear_sum_assignment(np.minimum(apart, MAX_POINT_DISTANCE))
+    markers, targets = linear_sum_assignment(np.minimum(apart, TUNING.max_point_distance))
     result = {
         motion.names[rows[m]]: names[t]
         for m, t in zip(markers, targets, strict=True)
-        if apart[m, t] < MAX_POINT_DISTANCE
+        if apart[m, t] < TUNING.max_point_distance
     }
-    if len(result) < max(MIN_MARKERS, MIN_PLACED * len(rows)):
+    if len(result) < max(TUNING.min_markers, TUNING.min_placed * len(rows)):
         raise ModelError(
             "no built-in set has the names of these markers, and their shape is not that of a face: only "
             f"{len(result)} of {len(rows)} would be where a face has feature points"
@@ -95,7 +95,7 @@ def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float
     from scipy.spatial import cKDTree
 
     skin = np.concatenate([part.vertices for part in model.of_kind("skin")]).astype(np.float64)
-    skin = skin[(skin[:, 2] > MIN_DEPTH) & (skin[:, 1] > model.points[:, 1].min() - 0.02)]
+    skin = skin[(skin[:, 2] > TUNING.min_depth) & (skin[:, 1] > model.points[:, 1].min() - 0.02)]
     tree = cKDTree(skin)
     key = np.array(list(_skin_points(model).values()))
     size = float(np.sqrt(((cloud - cloud.mean(axis=0)) ** 2).sum(axis=1).mean()))
@@ -111,9 +111,11 @@ def _lay_onto(cloud: Float64, model: FaceModel, up: str) -> tuple[Float64, float
     factor = min((1.0, *UNIT_FACTORS), key=lambda each: abs(np.log(each * size / usual)))
     middle = key.mean(axis=0)
     turned = [cloud * factor @ start.T for start in _rotations(up)]
-    starts = [_fit(each - each.mean(axis=0) + middle, tree, skin, key, FIRST_ITERATIONS) for each in turned]
-    best = sorted(starts, key=lambda fit: fit[1])[:FULL_FITS]
-    return min((_fit(laid, tree, skin, key, ITERATIONS) for laid, _ in best), key=lambda fit: fit[1])
+    starts = [
+        _fit(each - each.mean(axis=0) + middle, tree, skin, key, TUNING.first_iterations) for each in turned
+    ]
+    best = sorted(starts, key=lambda fit: fit[1])[: TUNING.full_fits]
+    return min((_fit(laid, tree, skin, key, TUNING.iterations) for laid, _ in best), key=lambda fit: fit[1])
 
 
 def _rotations(up: str) -> list[Float64]:
@@ -123,7 +125,10 @@ def _rotations(up: str) -> list[Float64]:
         axis = np.eye(3)["xyz".index(name[1])] * (1.0 if name[0] == "+" else -1.0)
         left = np.roll(np.abs(axis), 1)
         upright = np.stack([left, axis, np.cross(left, axis)])
-        result += [axis_matrices(1, 2 * np.pi * turn / DIRECTIONS) @ upright for turn in range(DIRECTIONS)]
+        result += [
+            axis_matrices(1, 2 * np.pi * turn / TUNING.directions) @ upright
+            for turn in range(TUNING.directions)
+        ]
     return result
 
 

@@ -10,34 +10,36 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.capture.markers._targets import LOWER_LIDS, target_points
 from fba.errors import ModelError, Remedy
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
 from fba.geometry import fit_similarity, principal_axes
+from fba.parameters import point_rows
 
 SIZE_RANGE = (0.6, 1.6)
 """Smallest and largest size of a face that is accepted, relative to an adult's."""
 UNIT_FACTORS = (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
 """Factors that correct a wrong unit: metres, centimetres and millimetres taken for each other."""
-MAX_REPAIR_RATIO = 0.5
-"""Largest ratio of the errors after and before mirroring, or swapping two markers, that shows the need."""
-MIN_MIRROR_ERROR = 0.004
-"""Smallest error of mirrored markers, in metres: flat sets of markers do not show it."""
-MAX_TILT = np.radians(8.0)
-"""Largest angle, in radians, of an upright head from an axis of the capture."""
-MAX_SWAPPED_COSINE = -0.5
-"""Largest cosine of the angle between the line of two swapped markers and that of their places."""
-MIN_DISTANCE = 0.008
-"""Smallest distance, in metres, between two swapped markers."""
-MAX_DISTANCE = 0.03
-"""Largest distance of a marker from its place, in metres, on a face of the actor's size."""
-IRIS_WIDTH = 0.0117
-"""Width of the iris of adults, in metres, which is nearly the same in all."""
 MIN_MARKERS = 6
 """Smallest number of markers at known places from which a face is found."""
 GIVE_MAP = Remedy("markers", "say which marker is where with {}", "{'Chin': '2.1', 'Cap1': 'head'}")
-MIN_SPREAD = 0.05
-"""Smallest sideways spread of markers, as a share of their length."""
 PAIRS = {**MIRRORED, "l_tragion": "r_tragion"}
 MIRROR_IMAGE = np.array([-1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the search for a face among markers; lengths in metres."""
+
+    max_repair_ratio: float = 0.5  # of errors after and before mirroring, or swapping two markers
+    min_mirror_error: float = 0.004  # error of mirrored markers: flat sets of markers do not show it
+    max_tilt: float = np.radians(8.0)  # angle, in radians, of an upright head from an axis of the capture
+    max_swapped_cosine: float = -0.5  # between the line of two swapped markers and that of their places
+    min_distance: float = 0.008  # distance, in metres, between two swapped markers
+    max_distance: float = 0.03  # of a marker from its place, on a face of the actor's size
+    iris_width: float = 0.0117  # width of the iris of adults, in metres, which is nearly the same in all
+    min_spread: float = 0.05  # sideways spread of markers, as a share of their length
+
+
+TUNING = Tuning()
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +82,12 @@ def register(
     there = np.array([places[markers[names[n]]] for n in rows])
     labels = [names[n] for n in rows]
     _, spread = principal_axes(found)
-    if not spread[1] > MIN_SPREAD * spread[0]:
+    if not spread[1] > TUNING.min_spread * spread[0]:
         raise ModelError("the markers of the face are all on one line, or in one place")
     mirrored = False
     error = fit_similarity(found, there).error
     mirror_error = fit_similarity(found, there, reflected=True).error
-    if mirror_error < MAX_REPAIR_RATIO * error and error > MIN_MIRROR_ERROR:
+    if mirror_error < TUNING.max_repair_ratio * error and error > TUNING.min_mirror_error:
         mirrored, found = True, found * MIRROR_IMAGE
     swapped = _find_swaps(labels, found, there)
     for one, other in swapped:
@@ -111,10 +113,13 @@ def _find_swaps(labels: list[str], found: Float64, there: Float64) -> list[tuple
         for b in range(a):
             line, wanted = placed[a] - placed[b], there[a] - there[b]
             lengths = np.linalg.norm(line), np.linalg.norm(wanted)
-            if min(lengths) > MIN_DISTANCE and line @ wanted < MAX_SWAPPED_COSINE * lengths[0] * lengths[1]:
+            if (
+                min(lengths) > TUNING.min_distance
+                and line @ wanted < TUNING.max_swapped_cosine * lengths[0] * lengths[1]
+            ):
                 before = np.linalg.norm(placed[a] - there[a]) + np.linalg.norm(placed[b] - there[b])
                 after = np.linalg.norm(placed[b] - there[a]) + np.linalg.norm(placed[a] - there[b])
-                if after < MAX_REPAIR_RATIO * before:
+                if after < TUNING.max_repair_ratio * before:
                     candidates.append((after - before, b, a))
     result: list[tuple[str, str]] = []
     taken: set[int] = set()
@@ -133,7 +138,7 @@ def _find_astray(labels: list[str], found: Float64, there: Float64) -> list[str]
         placed = fit_similarity(found[kept], there[kept]).apply(found[kept])
         off = np.linalg.norm(placed - there[kept], axis=1)
         worst = int(off.argmax())
-        if off[worst] < max(MAX_DISTANCE, 4 * float(np.median(off))):
+        if off[worst] < max(TUNING.max_distance, 4 * float(np.median(off))):
             break
         result.append(labels[kept.pop(worst)])
     return result
@@ -168,13 +173,13 @@ def _upright(rotation: Float64, pairs: Float64) -> Float64:
     up = rotation[1]
     nearest = np.zeros(3)
     nearest[np.abs(up).argmax()] = np.sign(up[np.abs(up).argmax()])
-    if np.arccos(np.clip(up @ nearest, -1, 1)) < MAX_TILT:
+    if np.arccos(np.clip(up @ nearest, -1, 1)) < TUNING.max_tilt:
         up = nearest
     left = rotation[0]
     if len(pairs):
         across = pairs.sum(axis=0)
         across /= np.linalg.norm(across)
-        left = across if across @ left > np.cos(2 * MAX_TILT) else left
+        left = across if across @ left > np.cos(2 * TUNING.max_tilt) else left
     front = np.cross(left, up)
     front /= np.linalg.norm(front)
     return np.stack([left, np.cross(front, left), front])
@@ -196,7 +201,7 @@ def complete_points(known: Mapping[str, Float64], template: Float64) -> Float64:
     moved, base = fit.apply(template), fit.apply(there)
     field = RBFInterpolator(base, here - base, kernel="linear", degree=0)
     result: Float64 = moved + field(moved)
-    rows = row_of()
+    rows = point_rows()
     for name, position in known.items():
         if name in rows:
             result[rows[name]] = position
@@ -208,7 +213,7 @@ def complete_points(known: Mapping[str, Float64], template: Float64) -> Float64:
 def _shut_lips(points: Float64, known: Mapping[str, Float64], template: Float64, scale: float) -> None:
     """Put the line between the lips, if it has no marker, half-way between two heights that real faces have:
     that of the mouth's corners, and that of the template."""
-    rows = row_of()
+    rows = point_rows()
     if "2.2" in known or not {"8.3", "8.4"} <= set(known):
         return
     inner = [rows[name] for name in ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9")]
@@ -220,10 +225,10 @@ def _shut_lips(points: Float64, known: Mapping[str, Float64], template: Float64,
 def _open_lids(points: Float64, known: Mapping[str, Float64]) -> None:
     """Open eyes without markers on both lids half-way between two openings: that of the template on a face of
     this size, and the width of an iris, which is alike in all adults."""
-    rows = row_of()
+    rows = point_rows()
     for upper, lower in LOWER_LIDS.items():
         if upper in known and lower in known:
             continue
-        opening = (points[rows[upper], 1] - points[rows[lower], 1] + IRIS_WIDTH) / 2
+        opening = (points[rows[upper], 1] - points[rows[lower], 1] + TUNING.iris_width) / 2
         fixed, moved, sign = (upper, lower, -1.0) if upper in known else (lower, upper, 1.0)
         points[rows[moved], 1] = points[rows[fixed], 1] + sign * opening

@@ -17,9 +17,8 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.face import Deformer, FaceModel, Fapu, feature_point_names
 from fba.face.authoring.regions.jaw import CHIN, EARS, Jaw, opening_angles, opening_shifts
-from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
-from fba.parameters import FAP_COUNT, faps
+from fba.parameters import FAP_COUNT, faps, point_rows
 
 RESPONSE_VALUE = 200.0
 """FAP value at which a response is measured."""
@@ -100,15 +99,15 @@ def choose_unknowns(points: Sequence[str], depth: bool = True, untold: Collectio
             continue
         if owner is not None:
             solved.append(fap.number)
-            rows.append((row_of()[owner], axis))
+            rows.append((point_rows()[owner], axis))
         elif inner in given:
-            rows.append((row_of()[inner], axis))
+            rows.append((point_rows()[inner], axis))
             if fap.lip_mate:
                 mates[fap.number] = fap.lip_mate
             else:
                 solved.append(fap.number)
     if JAW in solved:
-        rows += [(row_of()[point], axis) for point in BESIDE_CHIN if point in given for axis in (1, 2)]
+        rows += [(point_rows()[point], axis) for point in BESIDE_CHIN if point in given for axis in (1, 2)]
     return Unknowns(tuple(solved), mates, tuple(dict.fromkeys(rows)))
 
 
@@ -190,10 +189,10 @@ def jaw_curves(points: Float64, fapu: Fapu) -> dict[int, Float64]:
 
     points: float64 (84, 3), the actor's neutral feature points, metres, along the standard's axes.
     """
-    rows = [row_of()[name] for name in CHIN]
-    hinge = points[[row_of()[name] for name in EARS]].mean(axis=0)[1:]
+    rows = [point_rows()[name] for name in CHIN]
+    hinge = points[[point_rows()[name] for name in EARS]].mean(axis=0)[1:]
     none = np.zeros(0)
-    jaw = Jaw(none, none, hinge, points[row_of()["2.1"]], fapu.ES * 1024)
+    jaw = Jaw(none, none, hinge, points[point_rows()["2.1"]], fapu.ES * 1024)
     values, angles = opening_angles(jaw, fapu.MNS)
     shifts = opening_shifts(points[rows], jaw, np.interp(JAW_VALUES, values, angles)) / fapu.MNS
     return {row: shifts[:, n] for n, row in enumerate(rows)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float64
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
 
 SKULL = "head"
 """Place of markers anywhere on the skull, such as on a cap or a head band, which the head alone moves."""
@@ -31,7 +31,7 @@ TARGETS = (*RIGID, *MEASURED, *PLACED, *PUPILS)
 
 def target_points(points: Float64) -> dict[str, Float64]:
     """Return the position of each target but the skull on a face. points: float64 (84, 3)."""
-    result = {name: points[row_of()[name]] for name in TARGETS if name in row_of()}
+    result = {name: points[point_rows()[name]] for name in TARGETS if name in point_rows()}
     for name, between in TRAGIONS.items():
-        result[name] = np.mean([points[row_of()[point]] for point in between], axis=0)
+        result[name] = np.mean([points[point_rows()[point]] for point in between], axis=0)
     return result

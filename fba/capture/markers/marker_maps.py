@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import RIGID, SKULL, TARGETS
-from fba.capture.markers.motion import MarkerMotion
 from fba.errors import FbaWarning, FormatError, ModelError, OptionError, did_you_mean
-from fba.face.feature_points import row_of
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import change_known_names, read_names, simplify, write_names
-from fba.source import Path, read_table
+from fba.parameters import point_rows
+from fba.source import Path
+from fba.text_files import packaged_rows
 
 TABLE = "markers"
 MIN_NAMES = 8
@@ -27,7 +28,7 @@ MIN_SHARE = 0.6
 def marker_sets() -> dict[str, dict[str, str]]:
     """Return the built-in sets: name of the set -> simplified marker name -> target, "" for none."""
     result: dict[str, dict[str, str]] = {}
-    for row in read_table(__package__, "marker_sets.csv"):
+    for row in packaged_rows(__package__, "marker_sets.csv"):
         result.setdefault(row["set"], {})[simplify(row["marker"])] = row["target"]
     return result
 
@@ -130,11 +131,11 @@ def check_target(target: str) -> None:
     """Raise OptionError for a place where markers cannot be."""
     if target in TARGETS:
         return
-    if target in row_of():
+    if target in point_rows():
         raise OptionError(
             f"no marker can be at feature point {target}, which is inside the head or the mouth, or on hair"
         )
-    special = [name for name in RIGID if name not in row_of()]
+    special = [name for name in RIGID if name not in point_rows()]
     raise OptionError(
         f"there is no place {target!r}{did_you_mean(target, TARGETS)}; a marker is at a feature point of the "
         f"face, such as 2.1 or 8.3, or at {', '.join(special)}"

@@ -4,6 +4,6 @@ May use: parameters, the face, markers, and the modules of `fba` itself.
 """
 
 from fba.capture.points._conversion import find_point_face, from_points
-from fba.capture.points.motion import PointMotion
+from fba.capture.points._motion import PointMotion
 
 __all__ = ["PointMotion", "find_point_face", "from_points"]

@@ -12,12 +12,12 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
 from fba.capture.markers._faces import MarkerFace, Traits, find_face, from_markers
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._stabilisation import fit_poses, refine_reference
 from fba.capture.markers._targets import SKULL, target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.points._lifting import lift
+from fba.capture.points._motion import PointMotion
 from fba.capture.points._neutral import find_rests
-from fba.capture.points.motion import PointMotion
 from fba.capture.points.picture import face_misfit, upright_points
 from fba.capture.points.places import (
     check_places,
@@ -26,11 +26,11 @@ from fba.capture.points.places import (
     point_places,
     take_points,
 )
-from fba.capture.sampling import find_gaps, interpolate
 from fba.choices import Gaze
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.sampling import find_gaps, interpolate
 
 Neutral = str | int | tuple[float, float]
 GUESSED_DEPTH_FAPS = frozenset({14})

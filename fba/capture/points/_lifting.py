@@ -19,29 +19,32 @@ from fba.capture.markers._targets import PUPILS, RIGID
 from fba.capture.points.poses import Poses, fit_poses
 from fba.errors import ModelError
 from fba.face import FaceModel
-from fba.face.feature_points import row_of
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 
-MIN_STILL_POINTS = 5
-"""Smallest number of still points that define a pose."""
-ITERATIONS = 10
-"""Number of iterations in which shape and poses are computed, each from the other."""
 SAMPLE_FRAMES = 60
 """Approximate number of frames from which the shape is computed."""
 USUAL_FAPS = {"MNS": 150.0, "MW": 100.0, "ENS": 120.0, "ES": 60.0, "IRISD": 400.0}
 """Usual size of FAPs of each unit, root mean square, in thousandths of the unit."""
-GAZE_SHIFT = (0.004, 0.003)
-"""Usual shifts of pupils by the gaze, in metres: sideways, and up and down."""
-NOISE = 4e-4
-"""Error of trackers, in metres."""
 FACE_DIFFERENCE = np.array([0.005, 0.005, 0.004])
 """Distance of points between faces of the same size, in metres: sideways, up and in depth."""
-CORRELATION_LENGTH = 0.015
-"""Distance, in metres, over which such differences are correlated."""
-POINT_DIFFERENCE = 0.0015
-"""Distance, in metres, by which single points differ from those around them."""
-INDEPENDENT_RATE = 2.0
-"""Number of frames per second that carry new information about the shape."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the lifting of flat points into space."""
+
+    min_still_points: int = 5  # number of still points that define a pose
+    iterations: int = 10  # number of iterations in which shape and poses are computed, each from the other
+    # usual shifts of pupils by the gaze, in metres: sideways, and up and down
+    gaze_shift: tuple[float, float] = (0.004, 0.003)
+    noise: float = 4e-4  # error of trackers, in metres
+    correlation_length: float = 0.015  # distance, in metres, over which such differences are correlated
+    # distance, in metres, by which single points differ from those around them
+    point_difference: float = 0.0015
+    independent_rate: float = 2.0  # number of frames per second that carry new information about the shape
+
+
+TUNING = Tuning()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,17 +74,17 @@ def lift(
     """
     known = _know(list(places.values()), template, model)
     spread = np.sqrt(np.diag(known.motion).reshape(-1, 3).sum(axis=1))
-    if (spread < NOISE).sum() < MIN_STILL_POINTS:
+    if (spread < TUNING.noise).sum() < TUNING.min_still_points:
         raise ModelError(
-            f"{int((spread < NOISE).sum())} points without depth are at places that the face does not move; "
-            f"{MIN_STILL_POINTS} are needed to tell how the head turns"
+            f"{int((spread < TUNING.noise).sum())} points without depth are at places that the face does not "
+            f"move; {TUNING.min_still_points} are needed to tell how the head turns"
         )
-    trust = NOISE**2 / (NOISE**2 + spread**2)
+    trust = TUNING.noise**2 / (TUNING.noise**2 + spread**2)
     some = slice(None, None, max(1, len(points) // SAMPLE_FRAMES))
     few = points[some]
-    share = min(1.0, INDEPENDENT_RATE * float(times[-1] - times[0] + 0.5) / len(few))
+    share = min(1.0, TUNING.independent_rate * float(times[-1] - times[0] + 0.5) / len(few))
     shape = template.copy()
-    for _ in range(ITERATIONS):
+    for _ in range(TUNING.iterations):
         poses = fit_poses(shape, few, trust)
         shape = _refine(shape, few, poses, known, share)
     poses = fit_poses(shape, points, trust)
@@ -91,7 +94,7 @@ def lift(
 
 def _know(places: list[str], template: Float64, model: FaceModel) -> Knowledge:
     """Return the knowledge of a face whose points are at these places."""
-    rows = [row_of().get(place) for place in places]
+    rows = [point_rows().get(place) for place in places]
     each = measure_responses(model).each
     moves = np.zeros((len(each), len(places), 3))
     for fap in faps()[2:]:
@@ -102,11 +105,11 @@ def _know(places: list[str], template: Float64, model: FaceModel) -> Knowledge:
                     moves[fap.number - 1, n] = each[fap.number - 1, row] * size
     pupils = [n for n, place in enumerate(places) if place in PUPILS]
     looks = np.zeros((2, len(places), 3))
-    looks[0, pupils, 0], looks[1, pupils, 1] = GAZE_SHIFT
+    looks[0, pupils, 0], looks[1, pupils, 1] = TUNING.gaze_shift
     flat = np.concatenate([moves, looks]).reshape(-1, 3 * len(places))
     apart = np.linalg.norm(template[:, None] - template[None], axis=2)
-    alike = np.exp(-((apart / CORRELATION_LENGTH) ** 2) / 2)
-    shape = np.kron(alike, np.diag(FACE_DIFFERENCE**2)) + POINT_DIFFERENCE**2 * np.eye(3 * len(places))
+    alike = np.exp(-((apart / TUNING.correlation_length) ** 2) / 2)
+    shape = np.kron(alike, np.diag(FACE_DIFFERENCE**2)) + TUNING.point_difference**2 * np.eye(3 * len(places))
     return Knowledge(template, np.asarray(np.linalg.inv(shape)), np.asarray(flat.T @ flat))
 
 
@@ -122,7 +125,7 @@ def _inverse(poses: Poses, known: Knowledge) -> tuple[Float64, Float64]:
     rows = poses.rotation[:, :2]
     shows = known.motion.reshape(-1, 3) @ rows.swapaxes(1, 2)
     shows = shows.reshape(len(rows), 3 * count, 2 * count)
-    spread = _project(shows, rows) + NOISE**2 * np.eye(2 * count)
+    spread = _project(shows, rows) + TUNING.noise**2 * np.eye(2 * count)
     return np.asarray(shows), np.asarray(np.linalg.inv(spread))
 
 

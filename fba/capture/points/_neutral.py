@@ -15,38 +15,10 @@ from fba.arrays import Float64, Intp
 from fba.capture.markers._targets import LIDS, LOWER_LIDS, PUPILS
 from fba.errors import FbaWarning, Remedy
 
-NEUTRAL_SECONDS = 0.1
-"""Length of the window, in seconds, whose median is the neutral face."""
-OPEN_PERCENTILE = 75
-"""Percentile of the openings of eyes that is the usual opening of open eyes."""
 SPREADS = {
     "gap": 0.04, "width": 0.07, "corners": 0.03, "jaw": 0.12, "lids": 0.15, "brows": 0.045, "apart": 0.05,
 }  # fmt: skip
 """Usual differences between neutral faces and a known face, in distances of the eyes."""
-MOUTH_WIDTH = 0.8
-"""Usual width of mouths at rest, in distances of the eyes: that of the known face is large."""
-BROW_HEIGHT = 0.017
-"""Usual height of brows at rest above those of the known face, in distances of the eyes."""
-MAX_BROW_HEIGHT = 2.0
-"""Largest difference of brows at rest from that, in spreads: brows that are always beyond are held there."""
-CROWD_COST = 4.0
-"""Cost of a height of the brows for each factor e by which fewer frames have it."""
-SAME_HEIGHT = 0.02
-"""Largest difference of heights of brows that count as the same, in distances of the eyes."""
-MIN_HELD_DISTANCE = 0.06
-"""Smallest distance between brows at rest and held brows, in distances of the eyes."""
-MIN_HELD_SHARE = 0.15
-"""Smallest share of frames with held brows that needs a warning."""
-MIN_SURE_LEAD = 6.0
-"""Smallest lead in cost of a rest that is beyond doubt."""
-MAX_AHEAD_COST = 3.0
-"""Largest cost of turns of heads that look ahead, so that the height of their brows shows."""
-MAX_OPEN_SPREADS = 2.0
-"""Largest difference of open lids from usual, in spreads: such eyes show where they usually look."""
-TURN_SPREAD = 0.25
-"""Usual angle, in radians, between heads of neutral faces and the camera."""
-STEP_SPREAD = 0.2
-"""Change of a measure between frames, in spreads, that costs as much as a spread: rests do not move."""
 EYE_CORNERS = (("3.7", "3.11"), ("3.8", "3.12"))
 """Corners of the left and the right eye."""
 NOSE = "9.15"
@@ -61,6 +33,33 @@ PARTS = (
     (("brows", "apart"), ("4.",)),
 )
 """Measures that show the rest of a part of the face, and the beginnings of the names of its points."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the search for a neutral face; distances in distances of the eyes."""
+
+    neutral_seconds: float = 0.1  # length of the window, in seconds, whose median is the neutral face
+    open_percentile: int = 75  # percentile of the openings of eyes that is the usual opening of open eyes
+    # usual width of mouths at rest, in distances of the eyes: that of the known face is large
+    mouth_width: float = 0.8
+    # usual height of brows at rest above those of the known face, in distances of the eyes
+    brow_height: float = 0.017
+    # difference of brows at rest from that, in spreads: brows that are always beyond are held there
+    max_brow_height: float = 2.0
+    crowd_cost: float = 4.0  # cost of a height of the brows for each factor e by which fewer frames have it
+    # largest difference of heights of brows that count as the same, in distances of the eyes
+    same_height: float = 0.02
+    min_held_distance: float = 0.06  # distance between brows at rest and held brows, in distances of the eyes
+    min_held_share: float = 0.15  # share of frames with held brows that needs a warning
+    min_sure_lead: float = 6.0  # lead in cost of a rest that is beyond doubt
+    max_ahead_cost: float = 3.0  # cost of turns of heads that look ahead: only their brows count
+    max_open_spreads: float = 2.0  # difference of open lids from usual, in spreads
+    turn_spread: float = 0.25  # usual angle, in radians, between heads of neutral faces and the camera
+    step_spread: float = 0.2  # change between frames, in spreads, that costs as much as a spread
+
+
+TUNING = Tuning()
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ def find_rests(points: Float64, places: Mapping[str, str], template: Float64, ti
     measures = _measures(points, where)
     if "brows" in costs:
         costs["brows"] += _crowd_costs(measures["brows"], turned)
-    length = max(1, int(np.searchsorted(times - times[0], NEUTRAL_SECONDS)))
+    length = max(1, int(np.searchsorted(times - times[0], TUNING.neutral_seconds)))
     whole = _best(sum(costs.values(), turned), length)
     parts: dict[str, Intp] = {}
     for names, beginnings in PARTS:
@@ -100,23 +99,23 @@ def find_rests(points: Float64, places: Mapping[str, str], template: Float64, ti
             parts |= {place: rest for place in where if place.startswith(beginnings) and place not in STILL}
     raised = 0.0
     if "brows" in costs:
-        usual = float(_measures(template[None], where)["brows"][0]) + BROW_HEIGHT
+        usual = float(_measures(template[None], where)["brows"][0]) + TUNING.brow_height
         cost = np.asarray(costs["brows"] + costs["apart"] + turned)
         left, right = _eyes(points, where)
         distance = float(np.nanmedian(np.linalg.norm(left - right, axis=1)))
         raised = _judge_brows(measures["brows"] - usual, cost, parts[BROW], times, turned, distance)
     if "lids" in costs:
-        open_eyes = np.flatnonzero(costs["lids"] < MAX_OPEN_SPREADS**2)
+        open_eyes = np.flatnonzero(costs["lids"] < TUNING.max_open_spreads**2)
         parts |= {place: open_eyes for place in PUPILS if place in where and len(open_eyes)}
     return Rests(whole, parts, raised)
 
 
 def _crowd_costs(heights: Float64, turned: Float64) -> Float64:
     """Return the cost (T,) of frames whose height of brows few frames have. turned: cost of turns (T,)."""
-    ahead = np.isfinite(heights) & (turned < MAX_AHEAD_COST)
+    ahead = np.isfinite(heights) & (turned < TUNING.max_ahead_cost)
     ordered = np.sort(heights[ahead] if ahead.any() else heights[np.isfinite(heights)])
-    first, last = (np.searchsorted(ordered, heights + side * SAME_HEIGHT) for side in (-1, 1))
-    return np.asarray(CROWD_COST * np.log(len(ordered) / np.maximum(last - first, 1)))
+    first, last = (np.searchsorted(ordered, heights + side * TUNING.same_height) for side in (-1, 1))
+    return np.asarray(TUNING.crowd_cost * np.log(len(ordered) / np.maximum(last - first, 1)))
 
 
 def _judge_brows(
@@ -127,10 +126,10 @@ def _judge_brows(
     heights: (T,), above those of usual faces. cost: (T,), of frames as rests. eyes: their distance, metres.
     """
     there = float(np.nanmedian(heights[rest]))
-    most = MAX_BROW_HEIGHT * SPREADS["brows"]
+    most = TUNING.max_brow_height * SPREADS["brows"]
     excess = float(there - np.clip(there, -most, most))
-    ahead = turned < MAX_AHEAD_COST
-    others = ahead & (np.abs(heights - there) > MIN_HELD_DISTANCE)
+    ahead = turned < TUNING.max_ahead_cost
+    others = ahead & (np.abs(heights - there) > TUNING.min_held_distance)
     at = f"{float(times[rest].mean() - times[0]):.1f} s"
     said = []
     if excess:
@@ -138,11 +137,11 @@ def _judge_brows(
             f"brows are {1000 * abs(there) * eyes:.1f} mm {_comparative(excess)} than they usually rest, "
             f"even then: {1000 * abs(excess) * eyes:.1f} mm of that are shown, the other as this face's own"
         )
-    if others.sum() > MIN_HELD_SHARE * ahead.sum():
+    if others.sum() > TUNING.min_held_share * ahead.sum():
         apart = float(np.median(heights[others])) - there
         share = f"{100 * others.sum() / ahead.sum():.0f} % of the film"
         text = f"for {share} they are held {1000 * abs(apart) * eyes:.0f} mm {_comparative(apart)}"
-        if float(np.nanmin(cost[others])) - float(np.nanmin(cost[rest])) < MIN_SURE_LEAD:
+        if float(np.nanmin(cost[others])) - float(np.nanmin(cost[rest])) < TUNING.min_sure_lead:
             text += ", or it is the other way round, which is hard to tell"
         said.append(text)
     if said:
@@ -177,13 +176,13 @@ def _best(costs: Float64, length: int) -> slice:
 def _shape_costs(points: Float64, template: Float64, where: Mapping[str, int]) -> dict[str, Float64]:
     """Return by measure the cost (T,) of its difference from a neutral face, and of its change."""
     result = {}
-    usual = _measures(template, where) | {"width": np.array([MOUTH_WIDTH])}
+    usual = _measures(template, where) | {"width": np.array([TUNING.mouth_width])}
     if "brows" in usual:
-        usual["brows"] = usual["brows"] + BROW_HEIGHT
+        usual["brows"] = usual["brows"] + TUNING.brow_height
     for name, values in _measures(points, where).items():
         off = (values - usual[name]) / SPREADS[name]
         moving = np.abs(np.gradient(values)) / SPREADS[name] if len(values) > 1 else np.zeros(len(values))
-        result[name] = off**2 + (moving / STEP_SPREAD) ** 2
+        result[name] = off**2 + (moving / TUNING.step_spread) ** 2
     return result
 
 
@@ -216,7 +215,7 @@ def _measures(points: Float64, where: Mapping[str, int]) -> dict[str, Float64]:
     for upper, lower in LOWER_LIDS.items():
         if has(upper, lower):
             opening = apart(at(upper), at(lower)) / eyes
-            found["lids"] = opening / np.nanpercentile(opening, OPEN_PERCENTILE)
+            found["lids"] = opening / np.nanpercentile(opening, TUNING.open_percentile)
     if has("4.1", "4.2"):
         brows = at(*(place for place in ("4.1", "4.2", "4.3", "4.4") if place in where))
         found["brows"] = ((brows - (left + right) / 2) * up).sum(axis=1) / eyes
@@ -227,7 +226,7 @@ def _measures(points: Float64, where: Mapping[str, int]) -> dict[str, Float64]:
 def _turn_costs(points: Float64, template: Float64, where: Mapping[str, int]) -> Float64:
     """Return the cost (T,) of the head's turn from the camera."""
     off = _angles(points, where) - _angles(template, where)
-    return np.asarray(((off / TURN_SPREAD) ** 2).sum(axis=1))
+    return np.asarray(((off / TUNING.turn_spread) ** 2).sum(axis=1))
 
 
 def _angles(points: Float64, where: Mapping[str, int]) -> Float64:

@@ -16,7 +16,8 @@ from fba.capture.markers._targets import RIGID, SKULL
 from fba.capture.markers.marker_maps import check_map, check_target
 from fba.errors import OptionError
 from fba.name_maps import change_names, write_names
-from fba.source import Path, read_table
+from fba.source import Path
+from fba.text_files import packaged_rows
 
 PARTS = {68: (68,), 70: (68, 70), 468: (468,), 478: (468, 478)}
 """Rows of the table that count for each number of points."""
@@ -33,7 +34,7 @@ def point_places(count: int) -> dict[str, str]:
 
 @cache
 def _rows(count: int) -> list[dict[str, str]]:
-    rows = read_table(__package__, "point_places.csv")
+    rows = packaged_rows(__package__, "point_places.csv")
     return [row for row in rows if int(row["tracker"]) in PARTS[count]]
 
 

@@ -22,13 +22,11 @@ from fba.face.authoring.surface.attached_parts import attach
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface
-from fba.face.feature_points import row_of
 from fba.face.importers import import_model, sniff
 from fba.face.importers.assembly.model import metres_per_unit
 from fba.face.importers.head_surface import HeadSurface, read_head_surface
-from fba.face.model import point_row
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.parameters import FAP_COUNT, feature_points
+from fba.parameters import FAP_COUNT, feature_points, point_rows
 
 BUILT_IN = "built-in head"
 DEFAULT_HEIGHT = 0.26
@@ -169,8 +167,8 @@ def head_of_surface(surface: HeadSurface) -> MarkedHead:
     points = surface.given.points @ turn.T
     bound = np.full(len(names()), -1, dtype=np.int32)
     for name, vertex in surface.given.vertices.items():
-        bound[row_of()[name]] = vertex
-        points[row_of()[name]] = vertices[vertex]
+        bound[point_rows()[name]] = vertex
+        points[point_rows()[name]] = vertices[vertex]
     used = vertices[np.unique(surface.triangles)]
     try:
         metres = metres_per_unit(points)[0]
@@ -243,7 +241,7 @@ def _follow_jaw(model: FaceModel, skin: Surface, rows: Intp, opened: Float64) ->
 
     opened: float64 (N, 3), displacement of each vertex when the jaw opens.
     """
-    chin = next((int(model.bound[point_row(name)]) for name in CHIN_POINTS), -1)
+    chin = next((int(model.bound[point_rows()[name]]) for name in CHIN_POINTS), -1)
     whole = float(np.linalg.norm(opened[chin])) if chin >= 0 else 0.0
     if not whole > 0:
         return []

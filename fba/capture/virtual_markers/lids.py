@@ -16,8 +16,8 @@ from fba.capture.markers._targets import LOWER_LIDS
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.influence import Influence
 from fba.errors import ModelError
-from fba.face.feature_points import row_of
 from fba.face.gaze import LARGEST_GAZE
+from fba.parameters import point_rows
 from fba.rotations import axis_matrices
 
 UPPER_ROWS = (1.0, 0.9, 0.7)
@@ -61,7 +61,7 @@ def lid_at(head: MarkedHead, vertex: int) -> str:
 def lid_height(head: MarkedHead, lid: str) -> float:
     """Return the height of a lid, in the head's unit."""
     middles = list(LOWER_LIDS.items())[lid.startswith("right")]
-    rows = [row_of()[point] for point in middles]
+    rows = [point_rows()[point] for point in middles]
     return LID_HEIGHT * float(np.linalg.norm(np.diff(head.points[rows], axis=0)))
 
 
@@ -112,7 +112,7 @@ def narrow(head: MarkedHead, share: float) -> Float64:
     head has eyes, lids move round them. Raises ModelError for a head whose lids are not known.
     """
     moved = np.zeros((len(head.skin), 3))
-    rows = row_of()
+    rows = point_rows()
     has_lids = False
     for upper, lower in LOWER_LIDS.items():
         bound = int(head.bound[rows[upper]]), int(head.bound[rows[lower]])

@@ -12,9 +12,9 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture.markers._gaps import fill_gaps, often_seen, warn_of_gaps
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._neutral import neutral_frames
 from fba.capture.markers._stabilisation import follow_head, relate_poses, remove_poses
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers._alignment import lay_onto
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import Eye, find_eyes, narrow, turn_to_camera

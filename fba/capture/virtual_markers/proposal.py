@@ -7,15 +7,15 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from fba.arrays import Float64
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import LIDS, RIGID, SKULL, target_points
 from fba.capture.markers.marker_maps import find_map
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers._alignment import lay_onto
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import lid_at, lid_height
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
 from fba.errors import ModelError
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
 
 MIN_PLACES = 6
 """Smallest number of markers at places that the head has. They show where the other markers are."""
@@ -65,7 +65,7 @@ def propose_mapping(
             f"the feature points of {len(at)}, and {MIN_PLACES} are needed. Choose vertices by hand, or give "
             "the head's feature points"
         )
-    rows = row_of()
+    rows = point_rows()
     vertices: dict[str, int] = {}
     for name, place in at.items():
         bound = int(head.bound[rows[places[name]]]) if places[name] in rows else -1
@@ -145,7 +145,7 @@ def _radii(head: MarkedHead, vertices: Mapping[str, int], places: Mapping[str, s
     at = head.vertices[list(vertices.values())]
     away = cKDTree(at).query(at, k=min(NEIGHBOURS + 1, len(names)))[0]
     low, high = (size / head.metres for size in RADIUS_RANGE)
-    corners = head.points[[row_of()[name] for name in EYE_CORNERS]]
+    corners = head.points[[point_rows()[name] for name in EYE_CORNERS]]
     corners = corners[np.isfinite(corners).all(axis=1)]
     result = {}
     for name, place, usual in zip(names, at, np.clip(REACH * away[:, -1], low, high).tolist(), strict=True):
@@ -185,7 +185,7 @@ def _inner_lips(head: MarkedHead, at: Mapping[str, str]) -> dict[str, VirtualMar
     radius, depth = (round(size / head.metres, 6) for size in (LIP_RADIUS, LIP_DEPTH))
     found = {}
     for inner, outer in INNER_LIPS.items():
-        vertex = int(head.bound[row_of()[inner]])
+        vertex = int(head.bound[point_rows()[inner]])
         if outer in at and vertex >= 0 and np.isin(vertex, head.face):
             found[f"{at[outer]} inner"] = VirtualMarker(vertex, radius, depth, follows=at[outer])
     return found

@@ -233,7 +233,7 @@ def command(
 
 def _shows(model: Path | None) -> Callable[[FaceTrack], FaceTrack]:
     """Return the function from sent FAPs to those that a face shows, by default the built-in head."""
-    from fba.face.resolve import shown_faps
+    from fba.face import shown_faps
 
     face = read_model(model)
     return lambda track: shown_faps(track, face)

@@ -9,8 +9,9 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.errors import ModelError
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import names
 from fba.geometry import fit_similarity, principal_axes
+from fba.parameters import point_rows
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of length of files, in metres."""
@@ -188,6 +189,6 @@ def _find_unit(size: float, unit: str | float | None) -> tuple[float, str]:
 
 def centre_on_pupils(points: Float64, reference: Float64) -> Float64:
     """Return the points (84, 3), the middle of the pupils shifted to the reference's if both are known."""
-    rows = [row_of()["3.5"], row_of()["3.6"]]
+    rows = [point_rows()["3.5"], point_rows()["3.6"]]
     shift = reference[rows].mean(axis=0) - points[rows].mean(axis=0)
     return points + shift if np.isfinite(shift).all() else points

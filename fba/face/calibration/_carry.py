@@ -12,8 +12,7 @@ from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.calibration._align import known_rows
 from fba.face.calibration._eyes import FittedEye, eyeball_weight
 from fba.face.calibration._shape import Shape, fit_size
-from fba.face.feature_points import row_of
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 from fba.rotations import between
 
 if TYPE_CHECKING:
@@ -111,7 +110,7 @@ def _carry_transform(
         eye = eyes[transform.part]
         centre, size = eye(centre[None])[0], eye.size
     elif transform.part == HEAD:
-        head = row_of()["7.1"]
+        head = point_rows()["7.1"]
         if np.isfinite(points[head]).all() and np.isfinite(model.points[head]).all():
             centre = centre + points[head] - model.points[head]
     else:
@@ -132,7 +131,7 @@ def _carry_hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Fl
     a = np.column_stack([here - here.mean(axis=0), np.ones(len(here))])
     affine = np.linalg.lstsq(a.T @ a + 1e-6 * np.eye(4), a.T @ there, rcond=None)[0]
     moved: Float64 = np.append(centre - here.mean(axis=0), 1.0) @ affine
-    chin = row_of()["2.1"]
+    chin = point_rows()["2.1"]
     if not known[chin]:
         return moved, 1.0
     after, before = (np.hypot(*arm[1:]) for arm in (points[chin] - moved, model.points[chin] - centre))
@@ -142,7 +141,7 @@ def _carry_hinge(model: FaceModel, points: Float64, centre: Float64) -> tuple[Fl
 def _point_correction(model: FaceModel, table: FaceDefTables, moved: Mapping[str, Float64]) -> Float64 | None:
     """Return (K, 3, 3) matrices that restore the motion of the FAP's point, in FAPU; None without one."""
     for name in faps()[table.fap - 1].feature_points:
-        vertex = int(model.bound[row_of()[name]])
+        vertex = int(model.bound[point_rows()[name]])
         for mesh in table.meshes:
             rows = np.flatnonzero((mesh.vertices == vertex - model.starts[mesh.part]) & (vertex >= 0))
             if len(rows):

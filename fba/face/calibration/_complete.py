@@ -6,7 +6,8 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.errors import warn
-from fba.face.feature_points import FREE_POINTS, MATES, MIRRORED, names, row_of
+from fba.face.feature_points import FREE_POINTS, MATES, MIRRORED, names
+from fba.parameters import point_rows
 
 MIN_DISTANCE = 0.012
 """Points further apart on the face than this share of the pupils' distance must not coincide."""
@@ -76,7 +77,7 @@ def drop_mistakes(points: Float64, expected: Float64) -> Float64:
         if np.isnan(result[row, 0]) or names()[row] in FREE_POINTS or not away[row] > limit:
             continue
         other = MATES.get(names()[row])
-        mate = shift[row_of()[other]] * (-1.0, 1.0, 1.0) if other else np.full(3, np.nan)
+        mate = shift[point_rows()[other]] * (-1.0, 1.0, 1.0) if other else np.full(3, np.nan)
         if not np.linalg.norm(mate - shift[row]) < 0.5 * away[row]:
             result[row] = np.nan
             messages.append(
@@ -92,7 +93,7 @@ def _asymmetry(points: Float64) -> Float64:
     image = _mirror_image(points)
     apart = np.zeros(len(points))
     for name, other in MATES.items():
-        apart[row_of()[name]] = np.linalg.norm(points[row_of()[name]] - image[row_of()[other]])
+        apart[point_rows()[name]] = np.linalg.norm(points[point_rows()[name]] - image[point_rows()[other]])
     return np.nan_to_num(apart)
 
 
@@ -102,7 +103,7 @@ def mirror_missing(points: Float64) -> tuple[Float64, tuple[str, ...]]:
     full = points.copy()
     added = []
     for name, other in MATES.items():
-        row, source = row_of()[name], row_of()[other]
+        row, source = point_rows()[name], point_rows()[other]
         if np.isnan(points[row]).any() and np.isfinite(points[source]).all():
             full[row] = image[source]
             added.append(name)
@@ -117,7 +118,7 @@ def _mirror_image(points: Float64) -> Float64:
 
 def _symmetry_plane(points: Float64) -> tuple[Float64, float]:
     """Return normal and offset of the plane between left and right, by the points given; else +x."""
-    rows = np.array([(row_of()[left], row_of()[right]) for left, right in MIRRORED.items()])
+    rows = np.array([(point_rows()[left], point_rows()[right]) for left, right in MIRRORED.items()])
     known = np.isfinite(points[rows]).all(axis=(1, 2))
     left, right = points[rows[known, 0]], points[rows[known, 1]]
     normal = np.array([1.0, 0.0, 0.0])
@@ -126,7 +127,7 @@ def _symmetry_plane(points: Float64) -> tuple[Float64, float]:
         length = float(np.linalg.norm(across))
         if length > 0 and across[0] / length > np.cos(MAX_TILT):
             normal = across / length
-    middle = [row_of()[name] for name in names() if name not in MATES]
+    middle = [point_rows()[name] for name in names() if name not in MATES]
     halves = np.vstack([(left + right) / 2, points[middle][np.isfinite(points[middle]).all(axis=1)]])
     return normal, float(np.median(halves @ normal)) if len(halves) else 0.0
 
@@ -140,10 +141,10 @@ def centre_pupils(points: Float64) -> tuple[Float64, tuple[str, ...]]:
     full = points.copy()
     moved = []
     for pupil, upper, lower in (("3.5", "3.1", "3.3"), ("3.6", "3.2", "3.4")):
-        y, top, bottom = (points[row_of()[name], 1] for name in (pupil, upper, lower))
+        y, top, bottom = (points[point_rows()[name], 1] for name in (pupil, upper, lower))
         off = y - (top + bottom) / 2
         if abs(off) > MAX_PUPIL_OFFSET * (top - bottom) > 0:
-            full[row_of()[pupil], 1] -= off
+            full[point_rows()[pupil], 1] -= off
             moved.append((pupil, off))
     texts = [
         f"pupil {p} is {off * 1000:+.1f} mm off the middle between the lids: moved there" for p, off in moved
@@ -163,7 +164,7 @@ def shut_mouth(points: Float64, reference: Float64) -> Float64:
     width = _between(full, "8.3", "8.4")
     widest = 0.0
     for upper, lower, below in LIPS:
-        a, b, c = (row_of()[name] for name in (upper, lower, below))
+        a, b, c = (point_rows()[name] for name in (upper, lower, below))
         apart = reference[b] - reference[a]
         if np.isnan(apart).any():
             continue
@@ -186,7 +187,7 @@ def shut_mouth(points: Float64, reference: Float64) -> Float64:
             "the lower lip was moved",
             stacklevel=3,
         )
-    a, b = (row_of()[name] for name in TEETH)
+    a, b = (point_rows()[name] for name in TEETH)
     apart = full[a] + reference[b] - reference[a] - full[b]
     if np.isfinite(apart).all():
         if np.linalg.norm(apart) > 2 * MAX_LIP_GAP * width:
@@ -195,11 +196,11 @@ def shut_mouth(points: Float64, reference: Float64) -> Float64:
                 "of a neutral face do: the lower ones were moved",
                 stacklevel=3,
             )
-        full[[b, row_of()["9.9"]]] += apart
+        full[[b, point_rows()["9.9"]]] += apart
     return full
 
 
 def _between(points: Float64, left: str, right: str) -> float:
     """Return the distance of two points in x, metres; 0.06 where it is unknown or not positive."""
-    distance = float(points[row_of()[left], 0] - points[row_of()[right], 0])
+    distance = float(points[point_rows()[left], 0] - points[point_rows()[right], 0])
     return distance if np.isfinite(distance) and distance > 0 else 0.06

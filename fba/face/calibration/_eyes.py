@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fba.arrays import Bool, Float64, Floating
-from fba.easing import smoothstep
 from fba.errors import warn
 from fba.face.calibration._field import linear_field
 from fba.face.eyeball import Eyeball
+from fba.sampling import smoothstep
 
 LID_RADII = 1.10
 """Skin within this many radii of the eyeball's centre is on it: the lids and their lining."""

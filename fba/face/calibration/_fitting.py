@@ -23,9 +23,9 @@ from fba.face.calibration._field import (
 )
 from fba.face.calibration._shape import INNER, Shape, deform, rebuild_part
 from fba.face.fapu import PER_DISTANCE
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import names
 from fba.face.model import FaceModel, Part
-from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, point_rows
 
 if TYPE_CHECKING:
     from fba.face.checks._posing import Poser
@@ -112,7 +112,7 @@ def points_of_distances(model: FaceModel, distances: Mapping[str, float]) -> Flo
     own = {key: model.fapu[key[:-1]] * PER_DISTANCE for key in FAPU_DISTANCES}
     size = distances["ES0"] / own["ES0"]
     wanted = {key: distances.get(key, own[key] * size) for key in FAPU_DISTANCES}
-    row = row_of()
+    row = point_rows()
     scaled = model.points * size
     points = np.full_like(scaled, np.nan)
     eyes = [row[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.3", "3.4")]
@@ -164,7 +164,7 @@ def _size(here: Float64, there: Float64) -> float:
 
 def _iris_diameters(model: FaceModel, targets: Float64, size: float) -> tuple[float, float]:
     """Return (before, after) diameter of the iris, metres: the height of a neutral face's lid opening."""
-    row = row_of()
+    row = point_rows()
     before = model.fapu.IRISD * PER_DISTANCE
     heights = [
         float(targets[row[upper], 1] - targets[row[lower], 1])
@@ -184,7 +184,7 @@ def _deform_without_folds(
 ) -> Shape:
     """Return the shape by the smoothest deformation without folds. ModelError where every kernel folds."""
     outer = known & np.array([name not in INNER for name in names()])
-    pupils = [row_of()["3.5"], row_of()["3.6"]]
+    pupils = [point_rows()["3.5"], point_rows()["3.6"]]
     if outer.sum() < 4:
         outer[pupils] = known[pupils]
     rows = np.flatnonzero(outer)

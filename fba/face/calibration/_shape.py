@@ -13,9 +13,10 @@ from fba.face.calibration._align import known_rows
 from fba.face.calibration._eyes import REACH, FittedEye, fit_eye, lay_lids_on
 from fba.face.calibration._field import Field, bump_field
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, eyeballs
-from fba.face.feature_points import FREE_POINTS, names, row_of
+from fba.face.feature_points import FREE_POINTS, names
 from fba.geometry import Similarity, fit_similarity
 from fba.mesh import vertex_normals
+from fba.parameters import point_rows
 from fba.rotations import apply, between_all
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def deform(model: FaceModel, field: Field, targets: Float64, given: Bool, iris: 
     given: (84,), mask of the points that are reliable in the person's data. iris: its diameter before and
     after, metres.
     """
-    row = row_of()
+    row = point_rows()
     vertices = {part.name: field(part.vertices) for part in model.parts}
     fixed = _surface_points(model, targets)
     eyes: dict[str, FittedEye] = {}
@@ -144,7 +145,7 @@ def _fit_teeth_and_tongue(
     model: FaceModel, field: Field, targets: Float64, given: Bool
 ) -> tuple[dict[str, Similarity], Map]:
     """Return (map of the teeth by jaw, map of the tongue)."""
-    row = row_of()
+    row = point_rows()
     teeth = [part.vertices for part in model.of_kind("teeth")]
     inside = teeth or [part.vertices for part in model.of_kind("tongue")] or [model.vertices]
     vertices = np.concatenate(inside).astype(np.float64)
@@ -166,7 +167,7 @@ def _fit_teeth_and_tongue(
 
 def _behind_lips(model: FaceModel, field: Field, teeth: Similarity) -> Similarity:
     """Return the map of the teeth, shifted back so that they are as far behind the inner lips as before."""
-    known = [row for row in (row_of()[name] for name in LIPS) if np.isfinite(model.points[row]).all()]
+    known = [row for row in (point_rows()[name] for name in LIPS) if np.isfinite(model.points[row]).all()]
     vertices = np.concatenate([part.vertices for part in model.of_kind("teeth")]).astype(np.float64)
     lips, moved = field(model.points[known]), teeth.apply(vertices)
     back = 0.0
@@ -194,7 +195,7 @@ def _fit_tongue(base: Similarity, here: Float64, there: Float64) -> Map:
 
 def _jaw(model: FaceModel, part: Part) -> str:
     """Return the jaw of a part of the teeth, "upper" or "lower": above or below the line where they meet."""
-    edges = model.points[[row_of()["9.10"], row_of()["9.11"]], 1]
+    edges = model.points[[point_rows()["9.10"], point_rows()["9.11"]], 1]
     heights = [float(one.vertices[:, 1].mean()) for one in model.of_kind("teeth")]
     boundary = float(edges.mean()) if np.isfinite(edges).all() else float(np.mean(heights))
     return "upper" if float(part.vertices[:, 1].mean()) >= boundary else "lower"
@@ -229,11 +230,11 @@ def _points(
     points = field(np.nan_to_num(model.points))
     for jaw, group in TEETH.items():
         for name in group:
-            points[row_of()[name]] = teeth[jaw].apply(model.points[row_of()[name]][None])[0]
+            points[point_rows()[name]] = teeth[jaw].apply(model.points[point_rows()[name]][None])[0]
     for name in TONGUE:
-        points[row_of()[name]] = tongue(model.points[row_of()[name]][None])[0]
+        points[point_rows()[name]] = tongue(model.points[point_rows()[name]][None])[0]
     known = known_rows(targets)
-    free = [row_of()[name] for name in FREE_POINTS]
+    free = [point_rows()[name] for name in FREE_POINTS]
     points[free] = np.where(known[free, None], targets[free], points[free])
     joined = np.concatenate([vertices[part.name].astype(np.float32) for part in model.parts])
     bound = model.bound >= 0

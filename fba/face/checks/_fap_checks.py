@@ -12,11 +12,10 @@ from fba.arrays import Bool, Float64, Integer
 from fba.errors import OptionError
 from fba.face.checks._findings import Finding
 from fba.face.checks._posing import Poser
-from fba.face.feature_points import row_of
 from fba.face.model import Part
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, OPEN_JAW, TONGUE_ROLL
 from fba.geometry import nearest_rotation
-from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps, point_rows
 from fba.parameters import faps as fap_table
 from fba.rotations import cross, dot, lengths
 from fba.text_files import packaged_rows
@@ -131,7 +130,7 @@ def _check_region(poser: Poser, fap: int) -> Iterator[Finding]:
     if fap not in region_table():
         return
     names, reach = region_table()[fap]
-    points = poser.model.points[[row_of()[name] for name in names]]
+    points = poser.model.points[[point_rows()[name] for name in names]]
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return

@@ -17,7 +17,8 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.face.checks._findings import Finding
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
+from fba.parameters import point_rows
 from fba.text_files import packaged_rows
 
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -41,7 +42,7 @@ class Rule:
         """Return the texts (found, expected) where points (84, 3) break the rule; None if not, or unknown."""
         others = [name for name in (self.first, self.second) if name]
         column = AXES[self.axis]
-        value, *limits = (float(points[row_of()[name], column]) for name in (self.point, *others))
+        value, *limits = (float(points[point_rows()[name], column]) for name in (self.point, *others))
         if not np.isfinite([value, *limits]).all():
             return None
         slack, sign = self.share * unit, self.sign
@@ -81,9 +82,9 @@ def rules() -> tuple[Rule, ...]:
 
 def check_locations(points: Float64) -> Iterator[Finding]:
     """Yield a finding per broken rule, for feature points (84, 3) in metres, NaN where unknown."""
-    unit = float(points[row_of()["3.5"], 0] - points[row_of()["3.6"], 0])
+    unit = float(points[point_rows()["3.5"], 0] - points[point_rows()["3.6"], 0])
     for left, right in MIRRORED.items():
-        pair = points[[row_of()[left], row_of()[right]], 0]
+        pair = points[[point_rows()[left], point_rows()[right]], 0]
         if np.isfinite(pair).all() and pair[0] <= pair[1]:
             found = f"x {_mm(pair[0])} and {_mm(pair[1])}"
             expected = f"{left} on the subject's left: x greater than that of {right}"
@@ -117,7 +118,7 @@ def human_sizes() -> tuple[Size, ...]:
 def check_sizes(points: Float64) -> Iterator[Finding]:
     """Yield a finding per size outside its limits. points: (84, 3), metres, NaN where unknown."""
     for size in human_sizes():
-        ends = points[[row_of()[size.first], row_of()[size.second]], AXES[size.axis]]
+        ends = points[[point_rows()[size.first], point_rows()[size.second]], AXES[size.axis]]
         millimetres = abs(float(ends[0] - ends[1])) * 1000
         if np.isfinite(millimetres) and not size.low <= millimetres <= size.high:
             found = f"{millimetres:.1f} mm ({size.first} to {size.second}: {size.what})"

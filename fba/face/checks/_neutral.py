@@ -19,7 +19,8 @@ from fba.face.checks._findings import Finding
 from fba.face.checks._locations import check_locations, check_sizes
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, Eyeball, eyeballs, gaze, pupil_diameter
 from fba.face.fapu import PER_DISTANCE
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
+from fba.parameters import point_rows
 
 if TYPE_CHECKING:
     from fba.face.model import FaceModel, Part
@@ -205,10 +206,10 @@ def _check_tongue(model: FaceModel) -> Iterator[Finding]:
 
 
 def _check_symmetry(points: Float64) -> Iterator[Finding]:
-    rows = np.array([(row_of()[left], row_of()[right]) for left, right in MIRRORED.items()])
+    rows = np.array([(point_rows()[left], point_rows()[right]) for left, right in MIRRORED.items()])
     left, right = points[rows[:, 0]], points[rows[:, 1]] * (-1.0, 1.0, 1.0)
     known = np.isfinite(left).all(axis=1) & np.isfinite(right).all(axis=1)
-    unit = float(points[row_of()["3.5"], 0] - points[row_of()["3.6"], 0])
+    unit = float(points[point_rows()["3.5"], 0] - points[point_rows()["3.6"], 0])
     if known.sum() < 3:
         return
     apart = left[known] - right[known]
@@ -222,7 +223,7 @@ def _check_symmetry(points: Float64) -> Iterator[Finding]:
 
 
 def _point(model: FaceModel, name: str) -> Float64:
-    return np.asarray(model.points[row_of()[name]])
+    return np.asarray(model.points[point_rows()[name]])
 
 
 def _judge(

@@ -16,8 +16,8 @@ from fba.face._tables import HEAD
 from fba.face.authoring.regions._eyes import Eye, find_eyes
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.checks._findings import Finding
-from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
+from fba.parameters import point_rows
 
 KIND_ORDER = ("scale", "rotation", "translation")
 """Order in which the transforms of a part act, as in a Transform node."""
@@ -80,7 +80,7 @@ class Poser:
 
     def vertex(self, point: str) -> int:
         """Return the vertex of a feature point, counted through all parts; -1 if it is bound to none."""
-        return int(self.model.bound[row_of()[point]])
+        return int(self.model.bound[point_rows()[point]])
 
     def has(self, *points: str) -> bool:
         """Return whether all these feature points are bound to vertices."""
@@ -88,7 +88,7 @@ class Poser:
 
     def point(self, point: str) -> Float64:
         """Return (3,) a neutral feature point."""
-        return np.asarray(self.model.points[row_of()[point]])
+        return np.asarray(self.model.points[point_rows()[point]])
 
     @property
     def marks(self) -> Landmarks:

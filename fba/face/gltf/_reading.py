@@ -11,7 +11,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int32
 from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import names
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Part
 from fba.gltf import (
@@ -25,7 +25,7 @@ from fba.gltf import (
     read_material,
     unpack,
 )
-from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, point_rows
 
 NAME = "FBA_face"
 VERSION = 1
@@ -117,9 +117,9 @@ def _points(content: Value, parts: tuple[Part, ...]) -> tuple[Float64, Int32]:
     bound = np.full(len(names()), -1, dtype=np.int32)
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     for name, value in content.members():
-        if name not in row_of():
+        if name not in point_rows():
             raise value.error("there is no such feature point")
-        row = row_of()[name]
+        row = point_rows()[name]
         points[row] = value.member("position").numbers(3, -FLOAT32_MAX, FLOAT32_MAX)
         vertex = value.get("vertex")
         if vertex is not None:

@@ -15,9 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Float32, Float64
-from fba.easing import smoothstep
 from fba.errors import FormatError, ModelError
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import names
 from fba.face.importers.assembly._pieces import assemble, guess_kind, part_names
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.importers.assembly._repair import repair_tables
@@ -36,6 +35,8 @@ from fba.face.model import FaceModel, Material, Part
 from fba.face.shape_names import canonical_names
 from fba.gltf import Gltf, Value, convert_material
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import point_rows
+from fba.sampling import smoothstep
 from fba.text_files import MAX_VERTICES
 
 EXTENSION = "FBA_face"
@@ -88,7 +89,7 @@ def import_gltf(options: ImportOptions, points: object = None) -> FaceModel:
             raise ModelError(
                 f"{path}: feature point {name} is vertex {vertex}, but there are {len(vertices)}"
             )
-        positions[row_of()[name]] = vertices[vertex]
+        positions[point_rows()[name]] = vertices[vertex]
     return finish_import(pieces, positions, given.vertices, options)
 
 

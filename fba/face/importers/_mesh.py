@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.errors import ModelError, Remedy, warn
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import names
 from fba.face.importers.assembly._pieces import part_names
 from fba.face.importers.assembly._polygon_parts import Piece, make_piece
 from fba.face.importers.assembly.model import ImportOptions, finish_import
@@ -19,6 +19,7 @@ from fba.face.importers.points.fdp import NEUTRAL, Fdp, read_fdp, repair_sides, 
 from fba.face.importers.points.points_file import GivenPoints, given_points, points_beside
 from fba.face.model import FaceModel, Material
 from fba.mesh import Pictures, Polygons, read_mtl, read_obj, read_ply, read_vrml, read_wfm
+from fba.parameters import point_rows
 from fba.text_files import read_lines
 
 READERS: Mapping[str, Callable[[str | os.PathLike[str]], Polygons]] = {
@@ -92,8 +93,8 @@ def _point_positions(polygons: Polygons, given: GivenPoints, path: str) -> tuple
     vertices = dict(given.vertices)
     for name, vertex in given.vertices.items():
         if vertex < len(polygons.vertices):
-            positions[row_of()[name]] = polygons.vertices[vertex]
-        elif np.isfinite(positions[row_of()[name]]).all():
+            positions[point_rows()[name]] = polygons.vertices[vertex]
+        elif np.isfinite(positions[point_rows()[name]]).all():
             del vertices[name]
         else:
             raise ModelError(
@@ -120,7 +121,7 @@ def _in_unit_of_mesh(given: Float64, positions: Float64, bound: list[str], path:
     given: as the file of points says. positions: those of the `bound` points taken from their vertices. Warns
     of given positions that do not agree with their vertices.
     """
-    rows = [row_of()[name] for name in bound if np.isfinite(given[row_of()[name]]).all()]
+    rows = [point_rows()[name] for name in bound if np.isfinite(given[point_rows()[name]]).all()]
     if len(rows) < MIN_PAIRS:
         return positions
     a, b = given[rows], positions[rows]
@@ -203,6 +204,6 @@ def _import_xface(fdp: Fdp, options: ImportOptions) -> FaceModel:
                 numbers[point] = start + vertex
         start += len(shape.vertices)
     numbers = {
-        point: vertex for point, vertex in numbers.items() if np.isfinite(points[row_of()[point]]).all()
+        point: vertex for point, vertex in numbers.items() if np.isfinite(points[point_rows()[point]]).all()
     }
     return finish_import(pieces, points, numbers, replace(options, path=file, kinds=kinds))

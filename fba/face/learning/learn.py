@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import FbaError, ModelError, warn
+from fba.face._resolve import known_faps, resolve
 from fba.face.deform._deformer import Deformer
 from fba.face.deform.displacements import unit_motions, vertex_distances
 from fba.face.interpolation.table import InterpolationTable
@@ -23,7 +24,6 @@ from fba.face.learning._regression import (
 )
 from fba.face.learning.reduction import linked_columns, send_sources
 from fba.face.model import FaceModel
-from fba.face.resolve import known_faps, resolve
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_steps, faps
 from fba.tracks import FaceTrack
 

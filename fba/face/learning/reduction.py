@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Bool, Int32
+from fba.face._resolve import known_faps
 from fba.face.interpolation.table import InterpolationTable, sources_of
-from fba.face.mates import donors
-from fba.face.resolve import known_faps
-from fba.parameters import FAP_COUNT
+from fba.parameters import FAP_COUNT, mate_columns
 from fba.tracks import FaceTrack
 
 
@@ -25,7 +24,7 @@ def send_sources(track: FaceTrack, table: InterpolationTable) -> FaceTrack:
     values, known = known_faps(track)
     linked = linked_columns(table)
     moves = np.asarray(values.any(axis=0)) | linked
-    needed = moves | np.logical_or.reduce([moves[columns] for columns in donors()])
+    needed = moves | np.logical_or.reduce([moves[columns] for columns in mate_columns()])
     mask = known & needed & ~linked
     mask[:, _copies(values, mask, linked)] = False
     mask[:, source_columns(table)] = True
@@ -50,7 +49,7 @@ def _copies(values: Int32, mask: Bool, linked: Bool) -> list[int]:
 
 def _equals_its_donor(values: Int32, column: int, kept: Bool) -> bool:
     """Return whether the first mate of a column that is kept has the same values."""
-    donor = next((int(one[column]) for one in donors() if kept[one[column]]), None)
+    donor = next((int(one[column]) for one in mate_columns() if kept[one[column]]), None)
     return donor is not None and bool((values[:, donor] == values[:, column]).all())
 
 

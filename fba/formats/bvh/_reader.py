@@ -18,7 +18,6 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import SkeletonMotion
-from fba.capture.skeleton import MAX_FRAMES, check_memory
 from fba.errors import FbaWarning, FormatError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -27,7 +26,7 @@ from fba.source import read_whole
 MAX_JOINTS = 4096
 MAX_FRAME_RATE = 10_000
 """Highest rate, in frames per second."""
-MAX_LINES = 4 * MAX_FRAMES
+MAX_LINES = 4 * SkeletonMotion.MAX_FRAMES
 MAX_NUMBER = 1e12
 """Largest length or angle; more is damage."""
 BATCH_LINES = 4096
@@ -128,7 +127,7 @@ def parse(
     numbers = _numbers(source, first, channels, count)
     content = f"{len(tree.names)} joints, {channels} channels and {len(numbers)} frames"
     what = f"{path or 'BVH'}: a motion of {content}"
-    check_memory(limits, len(numbers), len(tree.names), what, len(text))
+    SkeletonMotion.check_memory(limits, len(numbers), len(tree.names), what, len(text))
     return _motion(tree, numbers, _rate(frame_time), name, source)
 
 
@@ -268,8 +267,10 @@ def _numbers(source: _Text, first: int, channels: int, stated: int | None) -> Fl
         counts.append(len(words))
         total += len(words)
         batch += words
-        if total // channels > MAX_FRAMES:
-            raise source.error(f"more than {MAX_FRAMES} frames; cut the motion into pieces", number)
+        if total // channels > SkeletonMotion.MAX_FRAMES:
+            raise source.error(
+                f"more than {SkeletonMotion.MAX_FRAMES} frames; cut the motion into pieces", number
+            )
         if len(row_lines) % BATCH_LINES == 0:
             blocks.append(_floats(batch, source, row_lines[-BATCH_LINES:]))
             batch = []

@@ -13,7 +13,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.atomic import atomic
-from fba.capture.skeleton import MAX_FRAMES
+from fba.capture import SkeletonMotion
 from fba.choices import Axes
 from fba.errors import FormatError, OptionError, Remedy
 from fba.parameters import BAP_COUNT
@@ -57,7 +57,7 @@ def write(
     (`fba.body.convention_names()`). unit: units in the file for one metre, by default centimetres.
 
     The root's OFFSET is 0 and its channels are world positions, because some programs add the two. Reading
-    the file returns the same BAPs (`fba.capture.skeleton.is_direct`); times begin at 0. Raises FormatError
+    the file returns the same BAPs (`fba.capture._skeleton.is_direct`); times begin at 0. Raises FormatError
     without a body, without frames, or for too many, OptionError for an unknown value of an option.
     """
     from fba.body import BapSolver
@@ -95,10 +95,10 @@ def _shown_baps(animation: Animation, path: Path) -> Int32:
     if not len(animation):
         raise FormatError("a BVH file needs at least one frame, and this animation has none", path=path)
     count = int(animation.index[-1]) - int(animation.index[0]) + 1
-    if count > MAX_FRAMES:
+    if count > SkeletonMotion.MAX_FRAMES:
         raise FormatError(
-            f"{count} frames from the first to the last are more than the {MAX_FRAMES} that BVH files "
-            "are read with; write shorter pieces, or resample",
+            f"{count} frames from the first to the last are more than the {SkeletonMotion.MAX_FRAMES} that "
+            "BVH files are read with; write shorter pieces, or resample",
             path=path,
         )
     body = animation.resample(animation.rate).body

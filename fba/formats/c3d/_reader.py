@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path as FilePath
+from typing import get_args
 
 import numpy as np
 
 from fba.arrays import Array, Float64, to_float64
 from fba.capture import MarkerMotion
-from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
+from fba.choices import FileUpAxis
 from fba.errors import FbaWarning, FormatError
 from fba.formats.c3d._parameters import BLOCK_BYTES, KEY, Parameters, read_parameters
-from fba.formats.markers._rows import file_rate, unique_names, without_subject
+from fba.formats.markers._rows import METRES, file_rate, unique_names, without_subject
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.sampling import regular_times
 from fba.source import Path, naming_file, read_whole
 
 COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
@@ -79,8 +81,10 @@ def read_markers(
     frames = min(frames, there)
     limits.check_frames(frames, f"{path}: a capture")
     limits.check_bytes(frames * points * 3 * 8 * 2, f"{path}: a capture", source=len(data))
-    if points > MAX_MARKERS:
-        raise FormatError(f"has {points} markers, more than the {MAX_MARKERS} that are read", path=path)
+    if points > MarkerMotion.MAX_MARKERS:
+        raise FormatError(
+            f"has {points} markers, more than the {MarkerMotion.MAX_MARKERS} that are read", path=path
+        )
     values = _positions(data, start, frames, points, analogue, scale, parameters)
     labels = unique_names(_labels(parameters, points), points)
     kept = _kept(parameters, labels)
@@ -158,8 +162,9 @@ def _units(parameters: Parameters, points: int) -> tuple[str, Float64]:
     return usual, np.array([METRES.get(word, METRES.get(usual, 0.001)) for word in words])
 
 
-def _up(parameters: Parameters) -> str:
+def _up(parameters: Parameters) -> FileUpAxis:
     """Return the axis that points up on the screen, "" if the file does not say."""
     stored = parameters.texts.get("POINT:Y_SCREEN", ("",))
     text = stored[0].lower() if stored else ""
-    return text if len(text) == 2 and text[0] in "+-" and text[1] in "xyz" else ""
+    axes: tuple[FileUpAxis, ...] = get_args(FileUpAxis)
+    return next((axis for axis in axes if axis == text), "")

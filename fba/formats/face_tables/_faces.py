@@ -10,10 +10,10 @@ from fractions import Fraction
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int64
-from fba.capture.sampling import find_gaps, find_rate
 from fba.errors import FormatError, Remedy
 from fba.formats.face_tables._tables import Table, check_order, named
 from fba.formats.text.frame_rates import Rate
+from fba.sampling import find_gaps, find_rate
 from fba.source import naming_file
 
 MIN_CONFIDENCE = 0.5

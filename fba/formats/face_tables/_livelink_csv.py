@@ -19,11 +19,9 @@ from fba.animation import Animation
 from fba.arrays import Float64
 from fba.atomic import atomic
 from fba.capture import ShapeMotion, to_blendshapes
-from fba.capture.blendshapes.shape_table import key_of
-from fba.capture.sampling import find_rate
 from fba.choices import Swap
 from fba.errors import FormatError, Remedy
-from fba.face.shape_names import arkit_names
+from fba.face import arkit_names
 from fba.formats.face_tables._faces import angle_unit
 from fba.formats.face_tables._tables import (
     Table,
@@ -38,6 +36,8 @@ from fba.formats.face_tables.shape_weights import check_weights, find_lacks, fin
 from fba.formats.text.frame_rates import Rate
 from fba.formats.time_codes import DAY, read_time_codes
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.name_maps import key_of
+from fba.sampling import find_rate
 from fba.source import Path, naming_file
 
 MIN_SHAPES = 5

@@ -15,7 +15,6 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import PointMotion
-from fba.capture.points.motion import COUNTS, OTHER_TRACKERS, check_count
 from fba.errors import FormatError, Remedy
 from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables._tables import regular_seconds
@@ -61,7 +60,7 @@ def _choose(arrays: dict[str, Any], path: Path, face: str | None) -> Float64:
     order = [*(name for name in NAMES if name in arrays), *arrays]
     for name in dict.fromkeys(order):
         points = _as_points(arrays[name])
-        if points is not None and points.shape[2] in COUNTS:
+        if points is not None and points.shape[2] in PointMotion.COUNTS:
             faces = points.shape[1]
             if faces > 1 and face is None:
                 raise FormatError(f"has {faces} faces", path=path).with_remedies(
@@ -72,12 +71,13 @@ def _choose(arrays: dict[str, Any], path: Path, face: str | None) -> Float64:
                 raise FormatError(f"has no face {face!r}; there are 0 to {faces - 1}", path=path)
             return points[:, number]
         shapes[name] = arrays[name].shape
-        if points is not None and points.shape[2] in OTHER_TRACKERS:
+        if points is not None and points.shape[2] in PointMotion.OTHER_TRACKERS:
             with naming_file(path):
-                check_count(points.shape[2])
+                PointMotion.check_count(points.shape[2])
     listed = ", ".join(f"{name} {shape}" for name, shape in list(shapes.items())[:6]) or "none of numbers"
     raise FormatError(
-        f"no array has points of a face, (frames, {' or '.join(map(str, COUNTS))}, 2 or 3), but {listed}",
+        f"no array has points of a face, (frames, {' or '.join(map(str, PointMotion.COUNTS))}, 2 or 3), "
+        f"but {listed}",
         path=path,
     )
 
@@ -94,7 +94,7 @@ def _as_points(array: Any) -> Float64 | None:
         return np.asarray(array[None, None])
     if array.ndim == 2:
         for width in (3, 2):
-            if array.shape[1] % width == 0 and array.shape[1] // width in COUNTS:
+            if array.shape[1] % width == 0 and array.shape[1] // width in PointMotion.COUNTS:
                 return np.asarray(array.reshape(len(array), 1, -1, width))
     return None
 

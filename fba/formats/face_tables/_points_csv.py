@@ -16,7 +16,6 @@ import numpy as np
 
 from fba.arrays import Float64, Int64
 from fba.capture import PointMotion
-from fba.capture.points.motion import COUNTS, OTHER_TRACKERS, check_count
 from fba.errors import FormatError, ModelError
 from fba.formats.face_tables._faces import choose_rows, row_times, tracked_rows
 from fba.formats.face_tables._points import build_points
@@ -54,7 +53,7 @@ WORDS = ("", "landmark", "landmarks", "lm", "lmk", "face", "facelandmark", "poin
          "keypoint", "facepoint", "mesh", "facemesh")  # fmt: skip
 """Words that may stand before the numbers of columns, in lower case."""
 PLAIN = re.compile(r"-?\d{1,9}(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?")
-PLAIN_COUNTS = {width * count for count in COUNTS for width in (2, 3)}
+PLAIN_COUNTS = {width * count for count in PointMotion.COUNTS for width in (2, 3)}
 """Counts of columns in tables whose columns are numbered or have no header."""
 MILLIMETRE = 0.001
 """Metres."""
@@ -144,7 +143,7 @@ def _read_wide(table: Table, rows: Int64) -> Float64:
     """Return points (T, N, 2 or 3) of a table with a column for each coordinate."""
     if (plain := _plain_columns(table.names)) is not None:
         count = len(plain)
-        width = 3 if count % 3 == 0 and count // 3 in COUNTS else 2
+        width = 3 if count % 3 == 0 and count // 3 in PointMotion.COUNTS else 2
         return table.numbers(plain)[rows].reshape(len(rows), -1, width)
     sets = _find_sets(table.names)
     if not sets:
@@ -161,7 +160,7 @@ def _read_wide(table: Table, rows: Int64) -> Float64:
         lacking = [f"{axis}_{number}" for number in _expected(numbers) if number not in chosen[axis]]
         if lacking:
             raise FormatError(f"columns are missing: {named(lacking)}", path=table.path, line=1)
-    if len(numbers) in (*OTHER_TRACKERS, 68, 70, 468, 478):
+    if len(numbers) in (*PointMotion.OTHER_TRACKERS, 68, 70, 468, 478):
         _check(len(numbers), table)
     columns = [[chosen[axis][number] for number in _expected(numbers)] for axis in axes]
     return np.stack([table.numbers(each)[rows] for each in columns], axis=2)
@@ -175,7 +174,7 @@ def _expected(numbers: list[int]) -> range:
 
 def _check(count: int, table: Table) -> None:
     try:
-        check_count(count)
+        PointMotion.check_count(count)
     except ModelError as error:
         raise FormatError(error.finding, path=table.path, line=1) from error
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import PointMotion
-from fba.capture.points.motion import COUNTS, check_count
 from fba.errors import FormatError, Remedy
 from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables._shapes_json import frame_time, frame_times, read_json
@@ -66,7 +65,7 @@ def read_points(
         raise FormatError("holds no frame with points of a face", path=path)
     shape = max((one.shape for one in known), key=lambda each: sum(one.shape == each for one in known))
     with naming_file(path):
-        check_count(shape[0])
+        PointMotion.check_count(shape[0])
     positions = np.full((len(frames), *shape), np.nan)
     for number, one in enumerate(sets):
         if one is None:
@@ -163,7 +162,7 @@ def _as_points(value: Any) -> Any:
         return None
     if _is_number(first) and all(map(_is_number, value)):
         for width in (3, 2):
-            if len(value) % width == 0 and len(value) // width in COUNTS:
+            if len(value) % width == 0 and len(value) // width in PointMotion.COUNTS:
                 return np.array(_numbers(value)).reshape(-1, width)
     return None
 
@@ -179,7 +178,7 @@ def _numbers(values: list[Any]) -> list[float]:
 
 def _choose(found: list[Float64], number: int, face: str | None, path: Path) -> Float64 | None:
     """Return the points of one face among those of a frame; None if it is absent."""
-    known = [one for one in found if len(one) in COUNTS]
+    known = [one for one in found if len(one) in PointMotion.COUNTS]
     if not known:
         return max(found, key=len) if found else None
     if face is not None:

@@ -17,14 +17,14 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import ShapeMotion
-from fba.capture.blendshapes.shape_table import key_of
-from fba.capture.sampling import find_rate
 from fba.errors import FormatError, Remedy
-from fba.face.shape_names import arkit_names
+from fba.face import arkit_names
 from fba.formats.face_tables._tables import named, seconds_of
 from fba.formats.face_tables.shape_weights import check_weights, find_lacks, shape_of
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.name_maps import key_of
+from fba.sampling import find_rate
 from fba.source import Path, naming_file, read_whole
 
 MIN_SHAPES = 5

@@ -10,10 +10,10 @@ from itertools import islice
 import numpy as np
 
 from fba.arrays import Float64
-from fba.capture.sampling import find_rate
 from fba.errors import FormatError
 from fba.limits import Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
+from fba.sampling import find_rate
 from fba.source import Path, naming_file, read_whole
 
 MOST_COLUMNS = 20_000

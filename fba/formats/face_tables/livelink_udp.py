@@ -16,9 +16,9 @@ import numpy as np
 
 from fba.arrays import Float64, Int64, to_float64
 from fba.capture import ShapeMotion
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.choices import Swap
 from fba.errors import FormatError, Remedy, UnsupportedError
+from fba.face import arkit_names
 from fba.formats.face_tables._tables import named
 from fba.formats.face_tables.shape_weights import check_weights, find_lacks, find_swap
 from fba.formats.time_codes import DAY, NOON
@@ -74,10 +74,10 @@ def read_face(
     limits.check_frames(len(order), f"{path}: the recording")
     values = np.array([packets[number].values for number in order])
     weights, head, eyes = divide_values(values)
-    check_weights(weights, ARKIT_ORDER, path)
-    findings += find_lacks(ARKIT_ORDER, weights, times - times[0], rate)
+    check_weights(weights, arkit_names(), path)
+    findings += find_lacks(arkit_names(), weights, times - times[0], rate)
     motion = ShapeMotion(
-        ARKIT_ORDER, weights, times - times[0], rate, head=head, eyes=eyes, start=float(times[0]),
+        arkit_names(), weights, times - times[0], rate, head=head, eyes=eyes, start=float(times[0]),
         name=FilePath(path).stem, findings=tuple(findings),
     )  # fmt: skip
     return find_swap(motion, swap, expected=False)
@@ -143,15 +143,15 @@ def divide_values(values: Float64) -> tuple[Float64, Float64, Float64]:
 
     values: (T, 61), as the app sends them.
     """
-    yaw, pitch, roll, left_yaw, left_pitch, _, right_yaw, right_pitch, _ = values[:, len(ARKIT_ORDER) :].T
+    yaw, pitch, roll, left_yaw, left_pitch, _, right_yaw, right_pitch, _ = values[:, len(arkit_names()) :].T
     head = np.stack([-pitch, yaw, roll], axis=1)  # up and left are positive there
     eyes = np.stack([-left_yaw, -right_yaw, left_pitch, right_pitch], axis=1)  # right and down
-    return values[:, : len(ARKIT_ORDER)], head, eyes
+    return values[:, : len(arkit_names())], head, eyes
 
 
 def join_values(motion: ShapeMotion) -> Float64:
     """Return values (T, 61) of a motion with ARKit's shapes and angles: the inverse of `divide_values`."""
-    assert motion.names == ARKIT_ORDER
+    assert motion.names == arkit_names()
     assert motion.head is not None
     assert motion.eyes is not None
     pitch, yaw, roll = motion.head.T

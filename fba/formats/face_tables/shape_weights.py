@@ -12,12 +12,12 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.capture import ShapeMotion
-from fba.capture.blendshapes.shape_table import key_of
-from fba.capture.sampling import find_gaps
 from fba.choices import Swap
 from fba.errors import FormatError, OptionError
-from fba.face.shape_names import arkit_names, arkit_of
+from fba.face import arkit_names, arkit_of
 from fba.formats.face_tables._tables import named
+from fba.name_maps import key_of
+from fba.sampling import find_gaps
 from fba.source import Path
 
 MAX_WEIGHT = 4.0
@@ -69,7 +69,7 @@ def find_lacks(names: Sequence[str], weights: Float64, times: Float64, rate: Fra
     """
     seen: Bool = np.isnan(weights).sum(axis=1) == 0
     findings = []
-    lacking = [name for name in arkit_names() if name not in names]
+    lacking = [name for name in sorted(arkit_names()) if name not in names]
     if lacking and lacking != ["tongueOut"]:  # MediaPipe has none
         findings.append(f"lacks {len(lacking)} of ARKit's 52 shapes: {named(lacking)}")
     if not seen.all():

@@ -14,8 +14,8 @@ import numpy as np
 
 from fba.animation import FaceTrack
 from fba.arrays import Bool, Float64
+from fba.capture import shape_faps
 from fba.capture.blendshapes.combination import JAW_OPEN, RADIAN, combine, to_face_track
-from fba.capture.blendshapes.shape_table import amounts_of
 from fba.errors import FbaWarning
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
 from fba.formats.gltf.clips import choose_clip
@@ -111,7 +111,7 @@ def _weights(gltf: Gltf, clip: Clip, times: Float64) -> dict[str, Float64]:
             continue
         weights = sample(channel, times)
         for column, name in enumerate(gltf.meshes[mesh].morph_names):
-            if amounts_of(name) is None and np.ptp(channel.values.reshape(len(channel.times), -1)) > 0:
+            if shape_faps(name) is None and np.ptp(channel.values.reshape(len(channel.times), -1)) > 0:
                 unknown.append(name)
             result.setdefault(name, weights[:, column])
     for name, node in _expressions(gltf):

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Array, Float32, Float64
-from fba.body import BodyModel, attach_head
-from fba.body.head_attachment import AttachedHead
+from fba.body import AttachedHead, BodyModel, attach_head
 from fba.face import HEAD, Deformer, FaceModel, Part
-from fba.face.model import point_row
 from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._joints import Clip, adopt, move
 from fba.formats.gltf._morph_targets import Targets, make_targets
 from fba.formats.gltf._pose import nearest_rotation
 from fba.gltf import Builder, PartWriter
+from fba.parameters import point_rows
 
 HEAD_NODE = "head"
 """The joint that FAPs 48 to 50 turn; BAPs turn its parent, the skull base."""
@@ -152,7 +151,7 @@ class HeadParts:
         triangles = part.triangles
         if skin and self.on is not None:
             positions = positions * self.place[0, 0] + self.place[:3, 3]
-            chin = self.model.points[point_row("2.1")][1]
+            chin = self.model.points[point_rows()["2.1"]][1]
             if part.kind == "other" and part.vertices[:, 1].max() < chin:
                 return None
             triangles = triangles[~self.on.hidden[rows][triangles].all(axis=1)]
@@ -213,7 +212,7 @@ def start_head(
     on = None
     if body is not None:
         skull = np.concatenate([np.full(len(p.vertices), p.kind not in BENDING_KINDS) for p in model.parts])
-        eyes = model.points[[point_row("3.5"), point_row("3.6")]]
+        eyes = model.points[[point_rows()["3.5"], point_rows()["3.6"]]]
         on = attach_head(body, model.vertices, eyes, skull)
     place = np.eye(4) if on is None else on.place
     targets = list(make_targets(model, shown))

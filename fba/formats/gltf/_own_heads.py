@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
-from fba.body.model import BodyPart
+from fba.body import BodyPart
 from fba.body.own_head import HeadShape, OwnEye, OwnHead
-from fba.capture.blendshapes.shape_table import amounts_of, largest_amounts
-from fba.face.shape_names import arkit_of
+from fba.capture import shape_faps
+from fba.capture.blendshapes.shape_table import largest_amounts
+from fba.face import arkit_of
 from fba.formats.gltf._face_motion import is_named
 from fba.formats.gltf.humanoid import Humanoid
 from fba.gltf import Gltf, Primitive, Value, optional_member
@@ -62,7 +63,7 @@ def read_head(
     budget = gltf.budget.copy()
     shapes = []
     for name, binds in listed.items():
-        faps = amounts_of(name)
+        faps = shape_faps(name)
         if faps is None or not faps.any():
             continue
         rows, shifts = _moved(gltf, meshes, binds)
@@ -84,7 +85,7 @@ def _named(gltf: Gltf) -> dict[str, Binds]:
         best: dict[str, int] = {}
         for column, name in enumerate(mesh.morph_names):
             shape = arkit_of(name) or name
-            if amounts_of(name) is not None and (shape not in best or name == shape):
+            if shape_faps(name) is not None and (shape not in best or name == shape):
                 best[shape] = column
         for shape, column in best.items():
             result.setdefault(shape, []).append((number, column, 1.0))
@@ -112,7 +113,7 @@ def _expressions(gltf: Gltf) -> dict[str, Binds]:
             for bind in entry.elements(MOST_BINDS, "morphTargetBinds")
             if (mesh := gltf.nodes[bind.member("node").index(len(gltf.nodes), "node")].mesh) is not None
         ]
-    return {name: binds for name, binds in result.items() if binds and amounts_of(name) is not None}
+    return {name: binds for name, binds in result.items() if binds and shape_faps(name) is not None}
 
 
 def _target(bind: Value, whole: float) -> tuple[int, float]:

@@ -18,7 +18,6 @@ from fba.arrays import Bool, Float64
 from fba.body import Skeleton
 from fba.capture import Captured, SkeletonMotion, SkeletonOptions, retarget_motion
 from fba.capture.bones import find_bones
-from fba.capture.skeleton import MAX_FRAMES, check_memory
 from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._face_motion import find_face_clip, nodes_of_faces, read_face_motion
 from fba.formats.gltf._own_files import find_note, read_note
@@ -171,9 +170,10 @@ def _count_frames(
     count = int(seconds * float(frames) + 1e-6) + 1
     what = f"{gltf.file}: animation {clip.name!r}, {seconds:.0f} s at {float(frames):g} frames/s,"
     limits.check_seconds(seconds, what)
-    if count > MAX_FRAMES:
+    if count > SkeletonMotion.MAX_FRAMES:
         raise ModelError(
-            f"{what} has {count} frames, more than {MAX_FRAMES}; give a lower rate, or cut it into pieces"
+            f"{what} has {count} frames, more than {SkeletonMotion.MAX_FRAMES}; give a lower rate, or cut it "
+            "into pieces"
         )
     return frames, count
 
@@ -190,7 +190,7 @@ def _sample(gltf: Gltf, clip: str | int | None, rate: Rate | None, limits: Limit
     seconds = float(times[-1]) - first
     what = f"{gltf.file}: animation {chosen.name!r}, {seconds:.0f} s at {float(frames):g} frames/s,"
     keys = sum(channel.times.nbytes + channel.values.nbytes for channel in channels)
-    check_memory(limits, count, len(nodes), what, keys)
+    SkeletonMotion.check_memory(limits, count, len(nodes), what, keys)
     motion = replace(joints.resting(gltf), rate=frames, name=chosen.name)
     turns, root = np.empty((count, len(used), 4)), np.empty((count, 3))
     stretched = np.zeros(len(used), dtype=np.bool_)

@@ -10,8 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba import rotations
-from fba.body import Skeleton
-from fba.body.skeleton import ROOT
+from fba.body import ROOT, Skeleton
 from fba.capture import SkeletonMotion, matching
 from fba.capture.bones import find_bones
 from fba.errors import FbaWarning, ModelError

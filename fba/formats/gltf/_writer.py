@@ -160,7 +160,7 @@ def _stand_on_ground(
 
     The root's own translation stays that of the BAPs, so that they are read back unchanged.
     """
-    from fba.body.footing import GroundedPoser
+    from fba.body import GroundedPoser
 
     poser = GroundedPoser(skeleton, axes)
     lifts = np.concatenate([poser.lifts(baps[n : n + CHUNK]) for n in range(0, len(baps), CHUNK)])

@@ -19,13 +19,10 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float32, Float64, Int32
-from fba.body import BodyModel, Skeleton
-from fba.body.model import BodyPart
+from fba.body import ROOT, BodyModel, BodyPart, Skeleton
 from fba.body.own_head import OwnHead
-from fba.body.skeleton import ROOT
 from fba.body.skin.skin_weights import strongest_weights
-from fba.capture import SkeletonMotion
-from fba.capture.blendshapes.shape_table import amounts_of
+from fba.capture import SkeletonMotion, shape_faps
 from fba.capture.preparation import Rest, find_rest
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
@@ -122,7 +119,7 @@ def describe_person(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> PersonInf
     except ModelError:
         return None
     meshes = [gltf.nodes[node].mesh for node in gltf.shown() if gltf.nodes[node].mesh is not None]
-    names = {name for mesh in gltf.meshes for name in mesh.morph_names if amounts_of(name) is not None}
+    names = {name for mesh in gltf.meshes for name in mesh.morph_names if shape_faps(name) is not None}
     declared = "" if found.humanoid is None else found.humanoid.kind
     return PersonInfo(declared, len(found.used), len(rest.mapped), len(meshes), len(names))
 

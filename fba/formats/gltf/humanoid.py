@@ -5,14 +5,13 @@ Sources: the extensions VRM (0.0), VRMC_vrm and VRMC_vrm_animation (1.0) of the 
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 from fba.gltf import Gltf, Value, optional_member
+from fba.text_files import packaged_rows
 
 EXTENSIONS = {"VRM": "VRM 0", "VRMC_vrm": "VRM 1", "VRMC_vrm_animation": "VRMA"}
 MOST_BONES = 200
@@ -41,8 +40,7 @@ class Humanoid:
 def joints_of_bones() -> dict[str, str]:
     """Return joints of the standard by VRM 1's names of bones."""
     result: dict[str, str] = {}
-    text = (files(__package__) / "humanoid_bones.csv").read_text(encoding="utf-8")
-    for row in csv.DictReader(text.splitlines()):
+    for row in packaged_rows(__package__, "humanoid_bones.csv"):
         bone, joint = row["bone"], row["joint"]
         sides = re.match(r"\((\w+)\|(\w+)\)", bone)
         for side, word in zip("lr", sides.groups(), strict=True) if sides else [("", "")]:

@@ -15,9 +15,9 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
-from fba.capture.markers.motion import METRES
 from fba.errors import FbaWarning, FormatError
 from fba.formats.markers._rows import (
+    METRES,
     build_motion,
     file_rate,
     frame_times,

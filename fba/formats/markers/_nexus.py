@@ -12,9 +12,8 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.capture import MarkerMotion
-from fba.capture.markers.motion import METRES
 from fba.errors import FormatError
-from fba.formats.markers._rows import build_motion, file_rate, parse_rows, read_lines, without_subject
+from fba.formats.markers._rows import METRES, build_motion, file_rate, parse_rows, read_lines, without_subject
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path

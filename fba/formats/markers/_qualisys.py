@@ -11,7 +11,6 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.capture import MarkerMotion
-from fba.capture.markers.motion import regular_times
 from fba.errors import FormatError
 from fba.formats.markers._rows import (
     build_motion,
@@ -24,6 +23,7 @@ from fba.formats.markers._rows import (
 from fba.formats.text.frame_rates import Rate
 from fba.formats.time_codes import parse_time_of_day
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.sampling import regular_times
 from fba.source import Path
 
 MAX_SETTINGS = 30

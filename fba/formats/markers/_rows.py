@@ -10,18 +10,21 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
-from fba.capture.markers.motion import MAX_MARKERS, regular_times
+from fba.choices import FileUpAxis
 from fba.errors import FbaWarning, FormatError, Remedy
 from fba.formats.text.frame_rates import Rate, parse_rate
 from fba.limits import Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
+from fba.sampling import regular_times
 from fba.source import Path, naming_file, read_whole
 
 MISSING = ("", "nan", "null", "none", "-", "na", "n/a")
 """Words, in lower case, that stand for a number that is not there."""
 ROUNDING = 0.1
 """Share of a frame by which rounded times may differ from those of a constant rate."""
-MOST_COLUMNS = 20 * MAX_MARKERS
+MOST_COLUMNS = 20 * MarkerMotion.MAX_MARKERS
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "dm": 0.1, "in": 0.0254, "ft": 0.3048}
+"""Units of length, in metres."""
 MIN_FRAME_RATE = 0.001
 """Lowest rate, in frames per second; a lower one is damage."""
 MAX_FRAME_RATE = 100_000
@@ -110,7 +113,7 @@ def build_motion(
     *,
     metres: float,
     unit: str,
-    up: str,
+    up: FileUpAxis,
     name: str,
     path: Path,
     lines: list[int],

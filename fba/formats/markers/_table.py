@@ -15,9 +15,9 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
-from fba.capture.markers.motion import MAX_MARKERS, METRES, regular_times
 from fba.errors import FormatError
 from fba.formats.markers._rows import (
+    METRES,
     build_motion,
     file_rate,
     frame_times,
@@ -27,6 +27,7 @@ from fba.formats.markers._rows import (
 )
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.sampling import regular_times
 from fba.source import Path
 
 TIMES = ("time", "times", "timestamp", "t", "seconds", "sec", "time (s)", "time (seconds)", "time_s")
@@ -148,8 +149,10 @@ def _read_long(
             owner.append(names.setdefault(row[label].strip().strip('"'), len(names)))
             row[label] = ""
         body.append(delimiter.join(row))
-    if len(names) > MAX_MARKERS:
-        raise FormatError(f"names {len(names)} markers, more than the {MAX_MARKERS} that are read", path=path)
+    if len(names) > MarkerMotion.MAX_MARKERS:
+        raise FormatError(
+            f"names {len(names)} markers, more than the {MarkerMotion.MAX_MARKERS} that are read", path=path
+        )
     rows, numbers = parse_rows(body, 1, delimiter, len(cells), path, limits)
     if not len(rows):
         raise FormatError("holds no frames", path=path)

@@ -12,9 +12,9 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba.capture import MarkerMotion
-from fba.capture.markers.motion import METRES
 from fba.errors import FormatError
 from fba.formats.markers._rows import (
+    METRES,
     build_motion,
     file_rate,
     frame_times,

@@ -7,11 +7,9 @@ other files y: upright people tell.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cache
-from importlib.resources import files
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -23,13 +21,13 @@ from fba.arrays import Float64
 from fba.capture import SkeletonMotion
 from fba.capture.blendshapes.combination import JAW_OPEN
 from fba.capture.blendshapes.conversion import convert_rows
-from fba.capture.sampling import find_rate, interpolate
-from fba.capture.skeleton import check_memory
 from fba.errors import FormatError, Remedy
 from fba.formats.numpy_archives import ZIP, read_arrays
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.sampling import find_rate, interpolate
 from fba.source import Path, naming_file
+from fba.text_files import packaged_rows
 
 RATES = ("mocap_frame_rate", "mocap_framerate", "fps")
 PARTS = ("poses", "root_orient", "pose_body")
@@ -151,7 +149,7 @@ def _skeleton(read_in: _Motion, path: Path, limits: Limits) -> SkeletonMotion:
     count, joints = read_in.turns.shape[:2]
     table = _joints()[:joints]
     names = tuple(row[0] for row in table)
-    check_memory(limits, count, joints, f"{path}: a motion", read_in.turns.nbytes)
+    SkeletonMotion.check_memory(limits, count, joints, f"{path}: a motion", read_in.turns.nbytes)
     turns = Rotation.from_rotvec(read_in.turns.reshape(-1, 3)).as_quat().reshape(count, joints, 4)
     turns = np.roll(turns, 1, axis=2)
     upright = _to_y_up(turns[:, 0])
@@ -197,8 +195,7 @@ def _face(read_in: _Motion, at: Float64, limits: Limits) -> FaceTrack | None:
 @cache
 def _joints() -> tuple[tuple[str, str, tuple[float, float, float]], ...]:
     """Return name, parent ("" for none) and place in metres of each joint, in the order of a pose."""
-    text = (files(__package__) / "joints.csv").read_text(encoding="utf-8")
     return tuple(
         (row["joint"], row["parent"], (float(row["x"]), float(row["y"]), float(row["z"])))
-        for row in csv.DictReader(text.splitlines())
+        for row in packaged_rows(__package__, "joints.csv")
     )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER
 from fba.errors import FormatError, UnsupportedError
+from fba.face import arkit_names
 from fba.formats.face_tables.livelink_udp import divide_values, read_packet
 from fba.formats.face_tables.shape_weights import check_weights
 from fba.live._protocols.sample import DatagramError, Sample
@@ -35,7 +35,7 @@ class LiveLinkReader:
                 raise DatagramError(f"with more than {MAX_CAMERA_RATE} frames in a second")
             (weights,), (head,), (eyes,) = divide_values(packet.values[None])
             seen = not np.isnan(packet.values).any()
-            check_weights(weights[None], ARKIT_ORDER, PLACE)
+            check_weights(weights[None], arkit_names(), PLACE)
         except UnsupportedError as error:
             raise DatagramError(f"of another kind: {error.what}") from error
         except FormatError as error:
@@ -43,7 +43,7 @@ class LiveLinkReader:
             raise DatagramError(reason) from error
         device, subject = packet.sender
         self._newest = Sample(
-            packet.seconds, ARKIT_ORDER, weights if seen else None, head, eyes,
+            packet.seconds, arkit_names(), weights if seen else None, head, eyes,
             subject.decode("utf-8", errors="replace"), device, packet.rate,
         )  # fmt: skip
         return [self._newest]

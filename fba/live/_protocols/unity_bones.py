@@ -8,7 +8,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.formats.gltf.humanoid import OLD_THUMB, joints_of_bones
-from fba.source import read_table
+from fba.text_files import packaged_rows
 
 TO_OUR_AXES = np.array([-1.0, 1.0, 1.0])
 """Factors of a position: Unity's x points to the subject's right, ours to the left."""
@@ -18,7 +18,7 @@ TO_OUR_AXES = np.array([-1.0, 1.0, 1.0])
 def parents() -> dict[str, str]:
     """Return the parent of each bone, "" for the hips; parents come first."""
     result: dict[str, str] = {}
-    for row in read_table(__package__, "unity_bones.csv"):
+    for row in packaged_rows(__package__, "unity_bones.csv"):
         for side in ("Left", "Right") if "?" in row["bone"] else ("",):
             result[row["bone"].replace("?", side)] = row["parent"].replace("?", side)
     return result

@@ -13,7 +13,7 @@ from fba.capture.points.places import point_places, take_points
 from fba.capture.points.poses import fit_poses
 from fba.errors import FbaWarning, ModelError
 from fba.face import neutral_points
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
 from fba.persona.points._tracked import TrackedFace
 from fba.persona.points.layout import TRACKED, point_weights
 from fba.rotations import axis_matrices
@@ -38,12 +38,12 @@ def from_point_motion(motion: PointMotion, *, aspect: float | None = None) -> Tr
     aspect is guessed.
     """
     places = point_places(motion.count)
-    names = tuple(name for name, place in places.items() if place in row_of())
+    names = tuple(name for name, place in places.items() if place in point_rows())
     whole: Bool = np.asarray(np.isfinite(take_points(motion.positions, names)).all(axis=(1, 2)))
     if not whole.any():
         raise ModelError(f"none of the {len(motion)} frames shows a whole face")
     column_of = {places[name]: n for n, name in enumerate(names)}
-    template = neutral_points()[[row_of()[place] for place in column_of]]
+    template = neutral_points()[[point_rows()[place] for place in column_of]]
     taken = take_points(motion.positions, names)[whole, :, :2]
     upright = upright_points(taken, names, places, template, motion.share, aspect or motion.aspect)
     error = face_misfit(upright[:: max(1, len(upright) // CHECKED_FRAMES)], template)
@@ -52,12 +52,12 @@ def from_point_motion(motion: PointMotion, *, aspect: float | None = None) -> Tr
             f"the points are not arranged as in a face: half of them are {1000 * error:.0f} mm off or more; "
             "are they another tracker's, or in another order?"
         )
-    features = np.zeros((len(upright), len(row_of()), 2))
+    features = np.zeros((len(upright), len(point_rows()), 2))
     for place, column in column_of.items():
-        features[:, row_of()[place]] = upright[:, column]
+        features[:, point_rows()[place]] = upright[:, column]
     for pupil, corners in PUPILS.items():
         if pupil not in column_of:
-            features[:, row_of()[pupil]] = upright[:, [column_of[name] for name in corners]].mean(axis=1)
+            features[:, point_rows()[pupil]] = upright[:, [column_of[name] for name in corners]].mean(axis=1)
     _check_needed(set(column_of) | set(PUPILS))
     points = np.full((len(motion), TRACKED, 2), np.nan)
     points[whole] = (point_weights()[:TRACKED] @ features) * (1.0, -1.0)
@@ -76,7 +76,7 @@ def from_point_motion(motion: PointMotion, *, aspect: float | None = None) -> Tr
 def _check_needed(tracked: set[str]) -> None:
     """Raise ModelError where the mask needs feature points that a tracker lacks."""
     used = np.abs(point_weights()[:TRACKED]).sum(axis=0) > 0
-    missing = [name for name, row in row_of().items() if used[row] and name not in tracked]
+    missing = [name for name, row in point_rows().items() if used[row] and name not in tracked]
     if missing:
         raise ModelError(f"the tracker's points lack feature points of the mask: {', '.join(missing)}")
 

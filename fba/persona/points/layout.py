@@ -13,17 +13,16 @@ In arrays, row n is point n + 1. Axes: x to the face's left, y up, z forward, mi
 
 from __future__ import annotations
 
-import csv
 import re
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Float64, Int64, Intp
 from fba.face import feature_point_names as names
 from fba.face import neutral_points
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
+from fba.text_files import packaged_rows
 
 TRACKED = 64
 """Number of points of a tracker."""
@@ -52,18 +51,13 @@ def _terms(text: str) -> list[tuple[str, float]]:
     ]
 
 
-def _read(name: str) -> list[dict[str, str]]:
-    text = (files(__package__) / name).read_text(encoding="utf-8")
-    return list(csv.DictReader(text.splitlines()))
-
-
 @cache
 def point_weights() -> Float64:
     """Return the weights (80, 84) of feature points in the points of tracker and outline."""
     weights = np.zeros((TRACKED + OUTLINE, len(names())))
-    for row in _read("points.csv"):
+    for row in packaged_rows(__package__, "points.csv"):
         for name, share in _terms(row["at"]):
-            weights[int(row["number"]) - 1, row_of()[name]] += share
+            weights[int(row["number"]) - 1, point_rows()[name]] += share
     return _frozen(weights)
 
 
@@ -71,13 +65,13 @@ def point_weights() -> Float64:
 def point_parts() -> tuple[str, ...]:
     """Return the part of each of the 80 points: one of `PARTS`, "nose", "left_iris", "right_iris",
     "outline"."""
-    return tuple(row["part"] for row in _read("points.csv"))
+    return tuple(row["part"] for row in packaged_rows(__package__, "points.csv"))
 
 
 @cache
 def point_names() -> tuple[str, ...]:
     """Return the description of each of the 80 points."""
-    return tuple(row["what"] for row in _read("points.csv"))
+    return tuple(row["what"] for row in packaged_rows(__package__, "points.csv"))
 
 
 @cache
@@ -89,7 +83,11 @@ def part_points(part: str) -> Intp:
 @cache
 def part_vertices(part: str) -> Intp:
     """Return the rows of the mask's vertices that belong to a part."""
-    computed = [SAME + n for n, row in enumerate(_read("computed_vertices.csv")) if row["part"] == part]
+    computed = [
+        SAME + n
+        for n, row in enumerate(packaged_rows(__package__, "computed_vertices.csv"))
+        if row["part"] == part
+    ]
     return np.array([*part_points(part), *computed], dtype=np.intp)
 
 
@@ -98,7 +96,7 @@ def vertex_weights() -> Float64:
     """Return the weights (2, 86, 80) of points in the x and the y of vertices."""
     weights = np.zeros((2, VERTICES, TRACKED + OUTLINE))
     weights[:, range(SAME), range(SAME)] = 1.0
-    for n, row in enumerate(_read("computed_vertices.csv")):
+    for n, row in enumerate(packaged_rows(__package__, "computed_vertices.csv")):
         for axis, column in enumerate("xy"):
             for name, share in _terms(row[column]):
                 weights[axis, SAME + n, int(name) - 1] += share
@@ -110,9 +108,9 @@ def depth_weights() -> Float64:
     """Return the weights (86, 84) of feature points in the depth of vertices."""
     weights = np.zeros((VERTICES, len(names())))
     weights[:SAME] = point_weights()[:SAME]
-    for n, row in enumerate(_read("computed_vertices.csv")):
+    for n, row in enumerate(packaged_rows(__package__, "computed_vertices.csv")):
         if row["depth"]:
-            weights[SAME + n, row_of()[row["depth"]]] = 1.0
+            weights[SAME + n, point_rows()[row["depth"]]] = 1.0
         else:
             weights[SAME + n] = vertex_weights()[0, SAME + n] @ point_weights()
     return _frozen(weights)
@@ -161,7 +159,7 @@ def compute_vertices(points: Float64) -> Float64:
 @cache
 def triangles() -> Int64:
     """Return the triangles of the mask: int64 (130, 3), 0-based vertices, counter-clockwise."""
-    rows = [[int(row[name]) - 1 for name in "abc"] for row in _read("triangles.csv")]
+    rows = [[int(row[name]) - 1 for name in "abc"] for row in packaged_rows(__package__, "triangles.csv")]
     array = np.array(rows, dtype=np.int64)
     array.flags.writeable = False
     return array

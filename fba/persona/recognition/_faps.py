@@ -11,9 +11,8 @@ from fba.arrays import Float64
 from fba.capture.blendshapes.combination import part_lids
 from fba.errors import ModelError
 from fba.face import Fapu, feature_point_names
-from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
-from fba.parameters import FAP_COUNT, faps
+from fba.parameters import FAP_COUNT, faps, point_rows
 from fba.persona.points.layout import SAME, TRACKED, point_weights, standard_points
 from fba.persona.recognition._recogniser import JAW_FAPS
 
@@ -62,7 +61,9 @@ def _vertex_of() -> dict[str, int]:
     """Return the vertex of the mask at each feature point that has one."""
     weights = point_weights()[:SAME]
     alone = (weights != 0).sum(axis=1) == 1
-    rows = {name: np.flatnonzero((weights[:, column] == 1.0) & alone) for name, column in row_of().items()}
+    rows = {
+        name: np.flatnonzero((weights[:, column] == 1.0) & alone) for name, column in point_rows().items()
+    }
     return {name: int(found[0]) for name, found in rows.items() if len(found)}
 
 
@@ -79,9 +80,9 @@ def measure_fapu(neutral: Float64) -> Fapu:
     """
     features = np.full((len(feature_point_names()), 3), np.nan)
     for name, vertex in _vertex_of().items():
-        features[row_of()[name], :2] = neutral[vertex]
+        features[point_rows()[name], :2] = neutral[vertex]
     for pupil, (above, below) in PUPILS.items():
-        features[row_of()[pupil], :2] = (neutral[above - 1] + neutral[below - 1]) / 2
+        features[point_rows()[pupil], :2] = (neutral[above - 1] + neutral[below - 1]) / 2
     try:
         return Fapu.measure(features)
     except ModelError as error:

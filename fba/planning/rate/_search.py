@@ -13,8 +13,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Int16
 from fba.codec import EncoderOptions, decode, quantise
 from fba.errors import FbaWarning, RangeError
-from fba.face import resolve
-from fba.face.resolve import known_faps
+from fba.face import known_faps, resolve
 from fba.planning._code_lengths import code_lengths
 from fba.planning._derived_faps import choose_faps, interpolated_faps
 from fba.planning._plan import NO_LIMITS, plan_compact

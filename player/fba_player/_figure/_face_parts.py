@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32, Intp
-from fba.easing import smoothstep
 from fba.errors import FbaWarning
 from fba.face import FaceModel, Part
-from fba.face.model import point_row
+from fba.parameters import point_rows
 from fba.rotations import unit
+from fba.sampling import smoothstep
 from fba_player._mesh.simplify import DetailLevels
 from fba_player._mesh.textures import RELIEF, FacePicture, load_picture, texture_breadth
 from fba_player.view._view import FaceShape
 
 if TYPE_CHECKING:
-    from fba.body import BodyModel
-    from fba.body.model import BodyPart
+    from fba.body import BodyModel, BodyPart
 
 
 SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
@@ -63,7 +62,7 @@ def compute_sway(model: FaceModel) -> Float32:
 
 def middle_of_points(model: FaceModel, names: Sequence[str]) -> Float64 | None:
     """Return (3,): the middle of the first two of the named feature points that the face has, or None."""
-    points = np.array([model.points[point_row(name)] for name in names])
+    points = np.array([model.points[point_rows()[name]] for name in names])
     first = points[np.isfinite(points).all(axis=1)][:2]
     return np.asarray(first.mean(axis=0)) if len(first) else None
 

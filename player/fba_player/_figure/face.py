@@ -12,9 +12,8 @@ import numpy as np
 from fba.arrays import Float32, Float64, Intp
 from fba.face import Deformer, FaceModel, Part
 from fba.face.eyeball import fit_sphere, flat_width
-from fba.face.model import point_row
 from fba.geometry import fit_similarity
-from fba.parameters import FAP_COUNT
+from fba.parameters import FAP_COUNT, point_rows
 from fba_player._figure._face_parts import (
     compute_sway,
     detail_levels,
@@ -26,9 +25,9 @@ from fba_player._figure._face_parts import (
 from fba_player._figure.face_light import MOUTH_OPEN, FaceLight
 from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
+from fba_player.view._camera import Subject
 from fba_player.view._geometry import rotation_vector, transform
 from fba_player.view._view import Eye, FaceMesh, FaceShape
-from fba_player.view.camera import Subject
 
 MAX_ROUNDNESS_ERROR = 0.03
 """A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""
@@ -113,7 +112,7 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
         behind = np.arange(len(vertices))
     rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED_VERTICES).astype(int))]
     unit = model.fapu.IRISD
-    lids = tuple(int(model.bound[point_row(name)]) for name in LID_POINTS[side])
+    lids = tuple(int(model.bound[point_rows()[name]]) for name in LID_POINTS[side])
     return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)
 
 
@@ -152,7 +151,7 @@ class FaceFigure:
     @cached_property
     def between_eyes(self) -> Float64:
         """(3,) the point between the pupils, metres, in the frame of the model."""
-        return np.asarray(self.model.points[[point_row("3.5"), point_row("3.6")]].mean(axis=0))
+        return np.asarray(self.model.points[[point_rows()["3.5"], point_rows()["3.6"]]].mean(axis=0))
 
     @cached_property
     def subject(self) -> Subject:

@@ -14,7 +14,7 @@ from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
 from fba.cache import load_or_make, make_key
 from fba.compiled import compiled, is_compiled
 from fba.face import Deformer, FaceModel
-from fba.face.model import point_row
+from fba.parameters import point_rows
 from fba_player._figure._face_parts import part_rows
 from fba_player._figure.occlusion import CACHE_VERSION, HARMONICS, Visibility, bake, weights
 
@@ -60,7 +60,7 @@ class FaceLight:
         self._deformer = deformer
         self._sway = sway
         self._last: tuple[tuple[object, ...], Float32] | None = None
-        lips = [int(model.bound[point_row(name)]) for name in ("2.2", "2.3")]
+        lips = [int(model.bound[point_rows()[name]]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
         self._tongues = [part_rows(model, part.name) for part in model.of_kind("tongue")]
 

@@ -8,11 +8,10 @@ from typing import cast
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
-from fba.body import BodyModel, attach_head
-from fba.body.head_attachment import AttachedHead, skull_of
-from fba.body.model import BodyPart
+from fba.body import AttachedHead, BodyModel, BodyPart, attach_head
+from fba.body.head_attachment import skull_of
 from fba.face import Part
-from fba.face.model import point_row
+from fba.parameters import point_rows
 from fba_player._figure._face_parts import detail_levels, make_shape, part_rows, with_triangles
 from fba_player._figure.body_light import BodyLight, build_body_light
 from fba_player._figure.face import FaceFigure
@@ -115,7 +114,7 @@ def build_person(body: BodyModel, figure: FaceFigure) -> Person:
     head, face_shapes, left_out = None, dict[str, FaceShape](), tuple[str, ...]()
     if body.eyes is not None:
         skull = np.concatenate([np.full(len(p.vertices), p.kind not in CARRIED) for p in model.parts])
-        eyes = model.points[[point_row("3.5"), point_row("3.6")]]
+        eyes = model.points[[point_rows()["3.5"], point_rows()["3.6"]]]
         head = attach_head(body, model.vertices, eyes, skull)
         face_shapes = _face_shapes(figure, head)
         left_out = ("head", "neck") if head.brings_neck else ("head",)
@@ -164,7 +163,7 @@ def turn_own_head(body: BodyModel, matrices: Float64, turn: Float64) -> Float64:
 def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]:
     """Return the face's parts by name, without the triangles that clothes hide."""
     model, shapes = figure.model, {}
-    chin = model.points[point_row("2.1")][1]
+    chin = model.points[point_rows()["2.1"]][1]
     for name, shape in figure.shapes.items():
         part = model.part(name)
         if part.kind == "other" and part.vertices[:, 1].max() < chin:

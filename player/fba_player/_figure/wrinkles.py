@@ -6,16 +6,15 @@ points say where each vertex of its skin lies in the map. Faces whose model asks
 
 from __future__ import annotations
 
-import csv
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
-from fba.easing import smoothstep
 from fba.face import FaceModel, Part
-from fba.face.model import point_row
+from fba.parameters import point_rows
+from fba.sampling import smoothstep
+from fba.text_files import packaged_rows
 from fba_player._mesh.wrinkle_map import WRINKLES
 
 BEGINNING_SHARE = 0.5
@@ -48,8 +47,7 @@ STIFFNESS = 1e-4
 def _table() -> tuple[Intp, Intp, Float64]:
     """Return the rows of wrinkles.csv: their wrinkles (R,), columns of their FAPs, left and right (2, R), and
     the values that bring the wrinkles out fully (R,)."""
-    with (files(__package__) / "wrinkles.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = packaged_rows(__package__, "wrinkles.csv")
     kinds = np.array([WRINKLES.index(row["wrinkle"]) for row in rows])
     columns = np.array([[int(row[side]) - 1 for row in rows] for side in ("left", "right")])
     return kinds, columns, np.array([float(row["full"]) for row in rows])
@@ -89,7 +87,7 @@ def place_wrinkles(model: FaceModel, part: Part) -> Float32 | None:
 
 def _in_front(model: FaceModel, positions: Float64) -> Float64:
     """Return the positions (N, 3) relative to the middle of the pupils, in eye separations."""
-    middle = model.points[[point_row("3.5"), point_row("3.6")]].mean(axis=0)
+    middle = model.points[[point_rows()["3.5"], point_rows()["3.6"]]].mean(axis=0)
     return np.asarray((positions - middle) / (model.fapu.ES * 1024))
 
 
@@ -100,7 +98,7 @@ def _points_in_map(model: FaceModel) -> tuple[Float64, Float64] | None:
         for side, point in ((1, name), (-1, MIRRORED.get(name))):
             if point is None:
                 continue
-            position = model.points[point_row(point)]
+            position = model.points[point_rows()[point]]
             if np.isfinite(position).all():
                 positions.append(position)
                 places.append((side * x, y))

@@ -11,7 +11,7 @@ from fba_player._ui._imgui_renderer import ImguiRenderer
 from fba_player._ui._transport_buttons import SIDE_MARGIN, Buttons
 from fba_player._ui.panels.panel import EITHER_BUTTON, STANDING
 from fba_player._ui.ruler import Ruler, label
-from fba_player.playback.timeline import clock_text
+from fba_player.playback._timeline import clock_text
 from fba_player.session._session import Session
 from fba_player.session._timeline_trace import stretch_at, trace_picture
 

@@ -7,8 +7,8 @@ from imgui_bundle import imgui
 from fba_player._ui import theme
 from fba_player._ui._docks import EDGE
 from fba_player._ui.panels.panel import STANDING, Panel, tooltip
+from fba_player.playback._timeline import clock_text
 from fba_player.playback.live import LiveAnimation
-from fba_player.playback.timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from fba_player._ui import _icons as icons
 from fba_player._ui import theme
 from fba_player._ui.panels.panel import icon_button, tooltip
-from fba_player.playback.transport import SPEEDS
+from fba_player.playback._transport import SPEEDS
 from fba_player.session._actions import act
 from fba_player.session._keys import key_of
 from fba_player.session._session import Session

@@ -17,9 +17,9 @@ from fba.arrays import Float64, UInt8
 from fba.capture.comparison import Stick
 from fba_player.export._sheet_layout import lay_out
 from fba_player.scene.scene import Scene
+from fba_player.view._camera import Camera, Subject
 from fba_player.view._geometry import transform
 from fba_player.view._view import View
-from fba_player.view.camera import Camera, Subject
 
 TILE = (400, 480)
 """Width and height of one of the two pictures of a frame, in pixels."""

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -14,14 +12,14 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, UInt8
 from fba.face import FaceModel
-from fba.face.model import point_row
-from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps
+from fba.parameters import EXPRESSIONS, FAP_COUNT, VISEMES, faps, point_rows
+from fba.text_files import packaged_rows
 from fba.tracks import FaceTrack
+from fba_player.export._offscreen import Offscreen
 from fba_player.export._sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
-from fba_player.export.offscreen import Offscreen
 from fba_player.scene.scene import Scene
+from fba_player.view._camera import Camera, Subject
 from fba_player.view._font import label_font, shortened
-from fba_player.view.camera import Camera, Subject
 
 SHEETS = ("faps", "visemes", "expressions", "all", "review")
 """Names of the sheets."""
@@ -96,7 +94,7 @@ def tiles(kind: str, scene: Scene) -> list[Tile]:
 @cache
 def _fap_tiles() -> tuple[Tile, ...]:
     tiles = []
-    for row in _rows("contact_sheet.csv"):
+    for row in packaged_rows(__package__, "contact_sheet.csv"):
         number = int(row["fap"])
         faps_shown = _faps(f"{row['with']} {number}={row['value']}")
         label = f"{number} {faps()[number - 1].name}"
@@ -109,12 +107,8 @@ def _fap_tiles() -> tuple[Tile, ...]:
 def _review_tiles() -> tuple[Tile, ...]:
     return tuple(
         Tile(row["label"], "", _faps(row["faps"]), row["view"], float(row["yaw"]))
-        for row in _rows("review_sheet.csv")
+        for row in packaged_rows(__package__, "review_sheet.csv")
     )
-
-
-def _rows(name: str) -> list[dict[str, str]]:
-    return list(csv.DictReader((files(__package__) / name).read_text(encoding="utf-8").splitlines()))
 
 
 def _faps(text: str) -> Float32:
@@ -151,7 +145,7 @@ def close_up(view: str, scene: Scene) -> Subject:
         return Subject((x, y + 0.05 * face.half_height, z), 0.86 * face.half_height, 0.86 * face.half_width)
     names, offset, half_height, half_width = close_ups[view]
     points = scene.model.points
-    middle = np.mean([points[point_row(name)] for name in names], axis=0) + offset
+    middle = np.mean([points[point_rows()[name]] for name in names], axis=0) + offset
     if not np.isfinite(middle).all():
         return face
     x, y, z = middle.tolist()

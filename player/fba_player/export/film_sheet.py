@@ -10,12 +10,12 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import UInt8
 from fba.errors import RangeError
+from fba_player.export._offscreen import Offscreen
 from fba_player.export._sheet_layout import FAINT, PAPER, TEXT, check_tile, lay_out
-from fba_player.export.offscreen import Offscreen
 from fba_player.export.render import as_scene, check_inside
-from fba_player.playback.timeline import timecode
+from fba_player.playback._timeline import timecode
+from fba_player.view._camera import Camera
 from fba_player.view._font import label_font, shortened
-from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
 Progress = Callable[[int, int], None]

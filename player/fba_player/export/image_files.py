@@ -16,7 +16,7 @@ import numpy as np
 from fba.arrays import UInt8
 from fba.atomic import PathLike, atomic, write_error
 from fba.errors import FormatError, Remedy, UnsupportedError
-from fba_player.export.recorder import FILMS
+from fba_player.export._recorder import FILMS
 
 PICTURES = (".png", ".jpg", ".jpeg")
 JPEG_QUALITY = 90

@@ -17,8 +17,8 @@ from typing import Any
 from fba.animation import Animation
 from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaError
-from fba_player.playback.timeline import clock_text
-from fba_player.view.camera import Camera
+from fba_player.playback._timeline import clock_text
+from fba_player.view._camera import Camera
 from fba_player.view.protocols import Showable
 
 WIDTH = 480
@@ -131,8 +131,8 @@ class Preview:
         ), note
 
     def _still(self, scene: Showable) -> str:
+        from fba_player.export._offscreen import Offscreen
         from fba_player.export.image_files import put_picture
-        from fba_player.export.offscreen import Offscreen
 
         width, height = self._size
         with Offscreen(scene, self._size, self._camera) as view:

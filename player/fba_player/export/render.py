@@ -13,6 +13,8 @@ from typing import Any
 from fba.animation import Animation
 from fba.atomic import PathLike
 from fba.errors import FbaError, RangeError, UnsupportedError
+from fba_player.export._offscreen import Offscreen
+from fba_player.export._recorder import FILMS, Recorder, exact_rate
 from fba_player.export.image_files import (
     PICTURES,
     Numbered,
@@ -22,10 +24,8 @@ from fba_player.export.image_files import (
     is_sequence,
     write_picture,
 )
-from fba_player.export.offscreen import Offscreen
-from fba_player.export.recorder import FILMS, Recorder, exact_rate
 from fba_player.scene.scene import Scene
-from fba_player.view.camera import Camera
+from fba_player.view._camera import Camera
 from fba_player.view.protocols import Showable
 
 Progress = Callable[[int, int], None]

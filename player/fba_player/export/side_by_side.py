@@ -13,13 +13,13 @@ from fba.animation import Animation
 from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import UnsupportedError
+from fba_player.export._offscreen import Offscreen
+from fba_player.export._recorder import FILMS, Recorder
 from fba_player.export._sheet_layout import PAPER, TEXT, check_tile, lay_out
 from fba_player.export.image_files import PICTURES, write_picture
-from fba_player.export.offscreen import Offscreen
-from fba_player.export.recorder import FILMS, Recorder
 from fba_player.export.render import PICTURE_SAMPLES, as_scene, film_rate
+from fba_player.view._camera import Camera
 from fba_player.view._font import label_font, shortened
-from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 
 Progress = Callable[[int, int], None]

@@ -27,9 +27,9 @@ from fba_player.gl._resources import (
     set_uniform,
     write_buffer,
 )
+from fba_player.view._camera import Camera
 from fba_player.view._geometry import project, world_normals, world_positions
 from fba_player.view._view import Dots, Extras, FaceMesh, Grid, Legend, Lines
-from fba_player.view.camera import Camera
 
 REFERENCE_HEIGHT = 720
 """Pixels: annotations have their nominal size in a picture this high."""

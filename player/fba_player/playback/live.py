@@ -18,11 +18,11 @@ from fba.arrays import Int64
 from fba.choices import BapTableOrAuto
 from fba.codec import Block, Decoder, FrameBuffer, StreamInfo, marked_table
 from fba.errors import BitstreamError, FbaError, FbaWarning
-from fba.face.resolve import FaceSettings
+from fba.face import FaceSettings
 from fba.formats.step_choice import choose_steps
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT
-from fba_player.playback.timeline import Timeline
-from fba_player.playback.transport import BUFFER_SECONDS
+from fba_player.playback._timeline import Timeline
+from fba_player.playback._transport import BUFFER_SECONDS
 
 CHUNK_BYTES = 1 << 16
 """Bytes read at once, at most."""

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from fba.arrays import Float64, Int64
-from fba_player.playback.timeline import FRAME_ROUNDING, Timeline, frame_position
+from fba_player.playback._timeline import FRAME_ROUNDING, Timeline, frame_position
 
 MAX_COMMON_RATE = 1_000_000
 """Largest common rate, in frames per second, of performances with different rates."""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import replace
 from functools import cache, cached_property
-from importlib.resources import files
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Floating
 from fba.parameters import FAP_COUNT, faps
+from fba.text_files import packaged_rows
 from fba_player._figure.face import FaceFigure
 from fba_player._mesh.primitives import sphere_mesh
 from fba_player._mesh.textures import linear_light
@@ -128,6 +127,5 @@ def heat_colours(shares: Floating) -> Float64:
 
 @cache
 def _table() -> Float64:
-    text = (files(__package__) / "influence.csv").read_text(encoding="utf-8")
-    rows = list(csv.reader(text.splitlines()))[1:]
-    return np.array(rows, dtype=np.float64)
+    rows = packaged_rows(__package__, "influence.csv")
+    return np.array([list(row.values()) for row in rows], dtype=np.float64)

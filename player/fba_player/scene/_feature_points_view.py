@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
 from fba.rotations import unit
 from fba_player._figure.face import FaceFigure
 from fba_player._mesh.primitives import tube_mesh
@@ -56,7 +56,7 @@ class PointView:
     def _radii(self) -> Float64:
         """Radii of the feature points that the face has, metres."""
         radii = np.full(len(self._known), POINT_RADIUS)
-        radii[[row_of()["3.5"], row_of()["3.6"]]] = PUPIL_RADIUS
+        radii[[point_rows()["3.5"], point_rows()["3.6"]]] = PUPIL_RADIUS
         return radii[self._known] * self._figure.scale
 
     @cached_property

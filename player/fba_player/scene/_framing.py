@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64
-from fba_player.view.camera import Subject
+from fba_player.view._camera import Subject
 
 BODY_SUBJECT = Subject((0.0, 0.88, 0.0), 0.98, 0.62)
 """A body that stands at the origin."""

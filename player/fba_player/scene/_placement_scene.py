@@ -17,11 +17,11 @@ from fba.face.importers.assembly.model import metres_per_unit
 from fba.rotations import unit
 from fba.tracks import FaceTrack
 from fba_player._figure._face_parts import part_colours, part_picture
-from fba_player.playback.timeline import Timeline
+from fba_player.playback._timeline import Timeline
 from fba_player.scene._point_placement import MATES, PointPlacement
+from fba_player.view._camera import Camera, Subject
 from fba_player.view._geometry import first_hit, ray_through, transform
 from fba_player.view._view import Colour, Dots, Extras, FaceMesh, FaceShape, View
-from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
 

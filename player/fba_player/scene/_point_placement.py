@@ -15,11 +15,11 @@ from fba.arrays import Float32, Float64, Intp
 from fba.face import feature_point_names as names
 from fba.face import neutral_points
 from fba.face.fapu import FAPU_POINTS
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
 from fba.face.importers.head_surface import HeadSurface
 from fba.face.importers.points.points_file import GivenPoints, write_points
 from fba.mesh import vertex_normals
-from fba.parameters import feature_points
+from fba.parameters import feature_points, point_rows
 from fba_player.scene._hand_editing import HandEditing
 
 INSIDE = ("7.1", "11.5")
@@ -91,7 +91,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         """Return float64 (84, 3): positions in the file's axes, NaN for points without a place."""
         points = np.full((len(names()), 3), np.nan)
         for name in self.places:
-            points[row_of()[name]] = self.position(name)
+            points[point_rows()[name]] = self.position(name)
         return points
 
     def place(self, vertex: int) -> None:
@@ -128,13 +128,13 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         points = np.full((len(names()), 3), np.nan)
         for name, place in self.places.items():
             if not isinstance(place, int):
-                points[row_of()[name]] = place
+                points[point_rows()[name]] = place
         comment = f"feature points of {Path(self.surface.path).name}, vertices counted from 0"
         write_points(path, GivenPoints(points, vertices), comment)
 
     def guess(self) -> Float64 | None:
         """Return (3,) the vertex about where the current point is; None if too few points have a place."""
-        rows = [row_of()[name] for name in self.names if name in self.places]
+        rows = [point_rows()[name] for name in self.names if name in self.places]
         if len(rows) < MIN_POINTS_FOR_GUESS:
             return None
         adult, here = neutral_points()[rows], self.positions()[rows]
@@ -142,7 +142,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
         middles = adult.mean(axis=0), turned.mean(axis=0)
         a, b = adult - middles[0], turned - middles[1]
         size = float((a * b).sum() / max((a * a).sum(), 1e-30))  # heads are upright: no rotation
-        place = (neutral_points()[row_of()[self.current]] - middles[0]) * size + middles[1]
+        place = (neutral_points()[point_rows()[self.current]] - middles[0]) * size + middles[1]
         away = np.linalg.norm(self.surface.vertices[self._used] - place @ self.surface.upright, axis=1)
         return np.asarray(self.surface.vertices[self._used[int(away.argmin())]])
 
@@ -160,8 +160,8 @@ class PointPlacement(HandEditing[dict[str, Place]]):
     def middle(self) -> float:
         """x of the plane between left and right, in the file's axes."""
         at = self.positions()[:, 0]
-        sides = [(at[row_of()[left]] + at[row_of()[right]]) / 2 for left, right in MIRRORED.items()]
-        central = [at[row_of()[name]] for name in self.names if name not in MATES]
+        sides = [(at[point_rows()[left]] + at[point_rows()[right]]) / 2 for left, right in MIRRORED.items()]
+        central = [at[point_rows()[name]] for name in self.names if name not in MATES]
         finite = [float(x) for x in (*sides, *central) if np.isfinite(x)]
         if finite:
             return float(np.median(finite))
@@ -195,7 +195,7 @@ class PointPlacement(HandEditing[dict[str, Place]]):
 
 def describe_point(name: str) -> str:
     """Return what a feature point is, and what needs it: "chin, lowest point: FAPs 3, 14, 15"."""
-    point = feature_points()[row_of()[name]]
+    point = feature_points()[point_rows()[name]]
     uses = []
     if name in FAPU_POINTS:
         uses.append("every face needs it")

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
 from fba.face import FaceModel
-from fba.face.model import point_row
+from fba.parameters import point_rows
+from fba.text_files import packaged_rows
 
 STEPS_BETWEEN_POINTS = 8
 """Number of steps between two feature points."""
@@ -37,12 +36,11 @@ class SkinLine:
 
 def skin_lines(model: FaceModel) -> list[SkinLine]:
     """Return the lines of `skin_lines.csv` whose feature points lie on the skin."""
-    with (files(__package__) / "skin_lines.csv").open(encoding="utf-8") as file:
-        rows = [(row["kind"], row["points"].split()) for row in csv.DictReader(file)]
+    rows = [(row["kind"], row["points"].split()) for row in packaged_rows(__package__, "skin_lines.csv")]
     skin = _build_skin_graph(model)
     lines = []
     for kind, names in rows:
-        bound = [int(model.bound[point_row(name)]) for name in names]
+        bound = [int(model.bound[point_rows()[name]]) for name in names]
         on_skin = [vertex for vertex in bound if vertex in skin.used]
         if len(on_skin) >= 2:
             line = skin.line(on_skin)

@@ -14,8 +14,8 @@ from fba_player.scene._compare_timeline import CompareTimeline
 from fba_player.scene._differences import Differences, differences
 from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
 from fba_player.scene.scene import Scene
+from fba_player.view._camera import PRESETS, Camera, Subject
 from fba_player.view._view import Extras, View
-from fba_player.view.camera import PRESETS, Camera, Subject
 from fba_player.view.protocols import Timed
 
 if TYPE_CHECKING:

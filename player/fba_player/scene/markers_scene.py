@@ -12,13 +12,13 @@ from fba.mesh import vertex_normals
 from fba.rotations import unit
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._mesh.textures import linear_light
-from fba_player.playback.timeline import CaptureTimes
+from fba_player.playback._timeline import CaptureTimes
 from fba_player.scene._fap_heatmap import GLOSS, heat_colours, heat_legend, plain_colours
 from fba_player.scene._placement_scene import fit_box, make_dots, plain_mesh, plain_shape
 from fba_player.scene.marker_editing import MarkerEditing
+from fba_player.view._camera import Camera, Subject
 from fba_player.view._geometry import first_hit, project, ray_through, rotation_vector, transform, translation
 from fba_player.view._view import Colour, Dots, Extras, Eye, FaceMesh, FaceShape, Legend, Lines, View
-from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
 

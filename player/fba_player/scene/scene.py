@@ -11,10 +11,10 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.choices import Axes
-from fba_player.playback.timeline import Timeline
+from fba_player.playback._timeline import Timeline
 from fba_player.scene._framing import Extent, body_extent
+from fba_player.view._camera import Camera, Subject
 from fba_player.view._view import View
-from fba_player.view.camera import Camera, Subject
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import SWITCHES, Switches
 
@@ -72,8 +72,7 @@ class Scene(Timed[Timeline]):
         self._extent: Extent | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
-            from fba.body import BodyModel
-            from fba.body.footing import GroundedPoser
+            from fba.body import BodyModel, GroundedPoser
             from fba_player.scene._bones import Bones
 
             self._body = body or BodyModel.default()

@@ -7,8 +7,8 @@ import time as wall
 from collections.abc import Callable
 from dataclasses import replace
 
-from fba.easing import smoothstep
-from fba_player.view.camera import Camera
+from fba.sampling import smoothstep
+from fba_player.view._camera import Camera
 from fba_player.view.protocols import Showable
 
 GLIDE_SECONDS = 0.35

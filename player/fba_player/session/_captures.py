@@ -13,11 +13,11 @@ import numpy as np
 
 from fba.arrays import UInt8
 from fba.errors import FbaError
+from fba_player.export._offscreen import cut_out
+from fba_player.export._recorder import Recorder
 from fba_player.export.image_files import write_picture
-from fba_player.export.offscreen import cut_out
-from fba_player.export.recorder import Recorder
 from fba_player.gl._framebuffer import Target
-from fba_player.gl.renderer import Renderer
+from fba_player.gl._renderer import Renderer
 from fba_player.session._session import Session
 from fba_player.sound.soundtrack import FilmSound
 

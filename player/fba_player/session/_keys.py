@@ -5,13 +5,12 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import sys
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
+from fba.text_files import packaged_rows
 from fba_player.view.switches import SWITCHES
 
 
@@ -43,14 +42,14 @@ def keys() -> tuple[Key, ...]:
             does=row["does"],
             shown=", ".join(_key_text(key) for key in row["keys"].split()),
         )
-        for row in _rows("keys.csv")
+        for row in packaged_rows(__package__, "keys.csv")
     )
 
 
 @cache
 def mouse() -> tuple[tuple[str, str], ...]:
     """Return (mouse gesture, what it does), for the help."""
-    return tuple((row["mouse"], row["does"]) for row in _rows("mouse.csv"))
+    return tuple((row["mouse"], row["does"]) for row in packaged_rows(__package__, "mouse.csv"))
 
 
 @cache
@@ -67,11 +66,6 @@ def key_of(action: str) -> str:
 
 def _key_text(key: str) -> str:
     return key if len(key) == 1 else "+".join(part[:1].upper() + part[1:] for part in key.split("+"))
-
-
-def _rows(name: str) -> list[dict[str, str]]:
-    text = (files(__package__) / name).read_text(encoding="utf-8")
-    return list(csv.DictReader(text.splitlines()))
 
 
 def tables() -> str:

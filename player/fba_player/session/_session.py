@@ -18,18 +18,18 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
-from fba_player.playback.transport import Transport
+from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._camera_controller import Viewpoint
 from fba_player.session._keys import by_name
 from fba_player.session._source import Source
+from fba_player.view._camera import Camera
 from fba_player.view._view import View
-from fba_player.view.camera import Camera
 from fba_player.view.protocols import Showable
 from fba_player.view.switches import SWITCHES, Switch
 
 if TYPE_CHECKING:
-    from fba_player.sound.player import Audio
+    from fba_player.sound._player import Audio
 
 Hook = Callable[[Float32, Float64], None]
 

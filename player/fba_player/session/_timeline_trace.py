@@ -17,7 +17,7 @@ from fba.codec import StreamInfo
 from fba.emotion import Readings, read_expressions
 from fba.emotion.recogniser import NEUTRAL, UNKNOWN
 from fba.errors import OptionError
-from fba.face.resolve import FaceSettings
+from fba.face import FaceSettings
 
 PREDICTED = (120, 160, 190)
 INTRA = (238, 178, 84)

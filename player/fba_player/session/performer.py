@@ -11,11 +11,11 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.tracks import BodyTrack, FaceTrack
-from fba_player.playback.timeline import Timeline
+from fba_player.playback._timeline import Timeline
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
-from fba_player.session.puppet import Puppet
-from fba_player.session.takes import TakeRecorder, Takes, take_rate
+from fba_player.session._puppet import Puppet
+from fba_player.session._takes import TakeRecorder, Takes, take_rate
 
 if TYPE_CHECKING:
     from pathlib import Path

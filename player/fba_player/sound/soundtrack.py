@@ -14,7 +14,7 @@ import numpy as np
 from fba.arrays import Float32, Int16
 from fba.atomic import PathLike
 from fba.errors import FormatError
-from fba_player.playback.transport import Transport
+from fba_player.playback._transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._pyav import import_av
 from fba_player.sound.audio_file import CHANNELS, SoundFile, open_sound

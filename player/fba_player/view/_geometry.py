@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Floating
 from fba.rotations import quaternions, unit
+from fba_player.view._camera import Camera
 from fba_player.view._view import FaceMesh
-from fba_player.view.camera import Camera
 
 Box = tuple[float, float, float, float]
 """Left, top, right and bottom of an upright rectangle."""

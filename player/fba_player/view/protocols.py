@@ -8,8 +8,8 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Generic, Protocol, Self, TypeVar
 
+from fba_player.view._camera import Camera
 from fba_player.view._view import View
-from fba_player.view.camera import Camera
 from fba_player.view.switches import Switches
 
 

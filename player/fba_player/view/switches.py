@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
-from importlib.resources import files
 
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
+from fba.text_files import packaged_rows
 
 Value = bool | str | int | None
 """A flag's bool, a choice's word, or a FAP's number (None for none)."""
@@ -93,13 +92,12 @@ class Switch:
 
 @cache
 def _table() -> dict[str, Switch]:
-    text = (files(__package__) / "switches.csv").read_text(encoding="utf-8")
     table: dict[str, Switch] = {}
-    for row in csv.DictReader(text.splitlines()):
+    for row in packaged_rows(__package__, "switches.csv"):
         choices = tuple(row["choices"].split())
-        default: Value = {"flag": row["default"] == "on", "choice": row["default"], "fap": None}[row["kind"]]
+        default: dict[str, Value] = {"flag": row["default"] == "on", "choice": row["default"], "fap": None}
         shown = row["name"], row["key"], row["label"], row["kind"]
-        table[row["name"]] = Switch(*shown, default, choices, row["description"])
+        table[row["name"]] = Switch(*shown, default[row["kind"]], choices, row["description"])
     return table
 
 

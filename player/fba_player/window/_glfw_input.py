@@ -9,7 +9,7 @@ from typing import Any
 from fba_player.session._controls import Controls
 from fba_player.session._keys import by_name
 from fba_player.session._session import Session
-from fba_player.window.display import decode
+from fba_player.window._display import decode
 
 CURSORS = {
     "text_input": "IBEAM_CURSOR",

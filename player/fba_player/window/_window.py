@@ -19,19 +19,19 @@ from fba_player.gl._context import (
     missing_text,
 )
 from fba_player.gl._framebuffer import Readback, Target
-from fba_player.gl.renderer import Renderer
+from fba_player.gl._renderer import Renderer
+from fba_player.playback._transport import Transport
 from fba_player.playback.live import LiveTimeline
-from fba_player.playback.transport import Transport
 from fba_player.session._captures import Captures, draw_screenshot
 from fba_player.session._controls import Controls
 from fba_player.session._pages import page_of
 from fba_player.session._session import Session
 from fba_player.session._source import Source
-from fba_player.view.camera import Camera
+from fba_player.view._camera import Camera
 from fba_player.view.protocols import Closing
+from fba_player.window._display import HOW_WITHOUT, FullScreen, start_glfw
 from fba_player.window._glfw_input import GlfwInput
 from fba_player.window._plain_overlay import Overlay, draw_opening
-from fba_player.window.display import HOW_WITHOUT, FullScreen, start_glfw
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable

@@ -14,8 +14,8 @@ from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.markers_scene import MarkersScene
+from fba_player.window._display import check_display
 from fba_player.window._window import Window
-from fba_player.window.display import check_display
 
 Subject = Literal["points", "markers"]
 

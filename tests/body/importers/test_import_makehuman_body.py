@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fba.body import BapSolver
-from fba.body.head_attachment import attach_head
+from fba.body import BapSolver, BodyModel, attach_head
 from fba.body.importers import import_makehuman
-from fba.body.model import BodyModel
 from fba.errors import FormatError, ModelError
 from fba.parameters import baps, joints
 
@@ -75,10 +73,10 @@ def test_a_hand_goes_where_its_wrist_goes(body: BodyModel) -> None:
 def test_its_own_head_continues_its_skin(folder: Path, body: BodyModel) -> None:
     """A head made of the same mesh ends where the body begins, and stays there in any pose."""
     from fba.face.importers.makehuman.makehuman import import_makehuman as import_head
-    from fba.face.model import point_row
+    from fba.parameters import point_rows
 
     model = import_head(folder)
-    head = attach_head(body, model.vertices, model.points[[point_row("3.5"), point_row("3.6")]])
+    head = attach_head(body, model.vertices, model.points[[point_rows()["3.5"], point_rows()["3.6"]]])
     assert head.brings_neck
     skin = model.part("skin")
     skin_rows = np.arange(len(skin.vertices))

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fba.body import BapSolver, Skeleton
-from fba.body.model import BodyModel, BodyPart
+from fba.body import BapSolver, BodyModel, BodyPart, Skeleton
 from fba.parameters import baps
 from small_bodies import Float64
 

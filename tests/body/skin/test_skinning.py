@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fba.body import BapSolver
-from fba.body.model import BodyModel, BodyPart
+from fba.body import BapSolver, BodyModel, BodyPart
 from fba.compiled import is_compiled
 from fba.mesh._meshes import vertex_normals
 from fba.parameters import baps

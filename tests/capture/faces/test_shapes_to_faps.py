@@ -9,8 +9,7 @@ import pytest
 
 from fba.animation import Animation
 from fba.arrays import Float64
-from fba.capture import ActionUnitMotion, ShapeMotion, from_blendshapes
-from fba.capture.blendshapes.shape_table import amounts_of
+from fba.capture import ActionUnitMotion, ShapeMotion, from_blendshapes, shape_faps
 from fba.errors import ModelError
 from fba.parameters import fap_numbers
 
@@ -31,7 +30,7 @@ def shown(animation: Animation, name: str) -> list[int]:
 def test_shapes_add_up_and_only_their_faps_are_sent() -> None:
     animation = from_blendshapes(motion(jawForward=[0.0, 0.5, 1.0], noseSneerLeft=0.5))
     assert shown(animation, "thrust_jaw") == [0, 200, 400]
-    sneer = amounts_of("noseSneerLeft")
+    sneer = shape_faps("noseSneerLeft")
     assert sneer is not None
     column = fap_numbers()["stretch_l_nose"] - 1
     assert shown(animation, "stretch_l_nose") == [round(sneer[column] / 2)] * 3
@@ -45,7 +44,7 @@ def test_shapes_add_up_and_only_their_faps_are_sent() -> None:
 def test_mouth_close_is_a_correction_of_jaw_open() -> None:
     both = from_blendshapes(motion(jawOpen=0.5, mouthClose=[0.0, 0.25, 0.5, 0.9]))
     lip = shown(both, "raise_b_midlip")
-    jaw, close = amounts_of("jawOpen"), amounts_of("mouthClose")
+    jaw, close = shape_faps("jawOpen"), shape_faps("mouthClose")
     assert jaw is not None
     assert close is not None
     column = fap_numbers()["raise_b_midlip"] - 1

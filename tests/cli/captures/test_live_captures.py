@@ -13,7 +13,7 @@ import pytest
 
 import fba
 import fba.live.receiver
-from fba.face.resolve import resolve
+from fba.face import resolve
 from fba.live import Receiver
 from fba.parameters import fap_numbers
 from tools.captures.face_files import datagram

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers import move_head, read_head, read_mapping
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import names
 from fba.formats.gltf.moved_head import write_moved_head
+from fba.parameters import point_rows
 from mesh_files import write_obj
 from small_head import small_head
 from tools.captures.marker_files import wide
@@ -43,9 +44,9 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
     write_obj(tmp_path / "head.obj", small_head().parts)
     points = small_head().points
     lines = [
-        f"{name},{','.join(map(str, points[row_of()[name]]))}"
+        f"{name},{','.join(map(str, points[point_rows()[name]]))}"
         for name in names()
-        if np.isfinite(points[row_of()[name]]).all()
+        if np.isfinite(points[point_rows()[name]]).all()
     ]
     (tmp_path / "head.points.csv").write_text("\n".join(["name,x,y,z", *lines]) + "\n")
     return tmp_path / "lip.csv", tmp_path / "head.obj"
@@ -61,7 +62,7 @@ def test_a_proposed_mapping_is_written_changed_and_used(
     proposed = read_mapping(first)
     assert proposed.made_for is not None
     assert proposed.made_for.name == "head.obj"
-    assert proposed.markers["8.2"].vertex == small_head().bound[row_of()["8.2"]]
+    assert proposed.markers["8.2"].vertex == small_head().bound[point_rows()["8.2"]]
     code, out, err = run(
         "markers", *files, "--map", first, "--map", "8.2=7", "--map", "9.3=", "--overlap", "add",
         "--gaze", "camera", "--squint", "30", "-o", second,

@@ -11,9 +11,8 @@ from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.checks import check_faps
 from fba.face.deform._deformer import Deformer
-from fba.face.feature_points import row_of
 from fba.face.points import DIRECTIONS
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 from grid_head import EYE_RADIUS, grid_head
 
 TRANSLATING = [
@@ -46,7 +45,7 @@ def moved(model: FaceModel, values: dict[int, float]) -> np.ndarray:
 
 
 def vertex(model: FaceModel, point: str) -> int:
-    return int(model.bound[row_of()[point]])
+    return int(model.bound[point_rows()[point]])
 
 
 def _normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -150,7 +149,7 @@ def test_lids_meet_at_1024(head: FaceModel, split: int) -> None:
 
 
 def test_closing_lids_stay_outside_the_eyeball(head: FaceModel) -> None:
-    centre = head.points[row_of()["3.5"]] - (0, 0, EYE_RADIUS)
+    centre = head.points[point_rows()["3.5"]] - (0, 0, EYE_RADIUS)
     skin = len(head.part("skin").vertices)
     for value in (200, 500, 800, 1024):
         place = (head.vertices + moved(head, {19: value}))[:skin]
@@ -160,7 +159,7 @@ def test_closing_lids_stay_outside_the_eyeball(head: FaceModel) -> None:
 @pytest.mark.parametrize(("number", "side", "axis"), [(23, 3.5, 0), (24, 3.6, 0), (25, 3.5, 1), (26, 3.6, 1)])
 def test_eyeballs_turn_about_their_centres(head: FaceModel, number: int, side: float, axis: int) -> None:
     pupil = vertex(head, str(side))
-    centre = head.points[row_of()[str(side)]] - (0, 0, EYE_RADIUS)
+    centre = head.points[point_rows()[str(side)]] - (0, 0, EYE_RADIUS)
     place = (head.vertices + moved(head, {number: 20000}))[pupil] - centre
     assert np.linalg.norm(place) == pytest.approx(EYE_RADIUS, rel=1e-3)
     # 0.2 rad: yaw to the subject's left is +x, pitch goes down
@@ -169,7 +168,7 @@ def test_eyeballs_turn_about_their_centres(head: FaceModel, number: int, side: f
 
 def test_a_pupil_dilates_on_its_eyeball(head: FaceModel) -> None:
     eye = head.part("left eye").vertices.astype(np.float64)
-    centre = head.points[row_of()["3.5"]] - (0, 0, EYE_RADIUS)
+    centre = head.points[point_rows()["3.5"]] - (0, 0, EYE_RADIUS)
     radius = head.fapu.IRISD * 1024 / 6
     off_axis = np.hypot(*(eye - centre)[:, :2].T)
     rim = (np.abs(off_axis - radius) < 0.25 * radius) & (eye[:, 2] > centre[2])
@@ -218,7 +217,7 @@ def test_points_find_their_vertices_by_themselves(head: FaceModel) -> None:
     """Upper and lower lip lie on each other, and so do upper and lower teeth: still each gets its own."""
     parts, points, bound = grid_head()
     alone = author(parts, points)
-    found = [n for n in row_of() if alone.bound[row_of()[n]] != bound[row_of()[n]]]
+    found = [n for n in point_rows() if alone.bound[point_rows()[n]] != bound[point_rows()[n]]]
     assert found == []
 
 

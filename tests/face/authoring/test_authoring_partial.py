@@ -13,8 +13,8 @@ from fba.face import FaceModel
 from fba.face.authoring import author
 from fba.face.authoring._author import author_lids
 from fba.face.checks import check_faps
-from fba.face.feature_points import row_of
 from fba.face.model import Part
+from fba.parameters import point_rows
 from grid_head import grid_head
 
 
@@ -35,7 +35,7 @@ def bound() -> np.ndarray:
 
 def without(points: np.ndarray, bound: np.ndarray, *names: str) -> tuple[np.ndarray, np.ndarray]:
     points, bound = points.copy(), bound.copy()
-    rows = [row_of()[name] for name in names]
+    rows = [point_rows()[name] for name in names]
     points[rows], bound[rows] = np.nan, -1
     return points, bound
 
@@ -62,13 +62,13 @@ def test_an_eye_without_a_lids_margin_has_no_opening() -> None:
     """A shape may close an eye of which a feature point is missing, so that no margin is found."""
     parts, points, bound = grid_head()
     corners = ("3.7", "3.11", "3.1")
-    upper_lid = points[row_of()["3.1"]].copy()
+    upper_lid = points[point_rows()["3.1"]].copy()
     model = author(parts, points, bound=bound)
     shape = np.zeros((sum(len(part.vertices) for part in parts), 3))
     assert author_lids(model, {19: [shape]}) == {}
     lost_points, lost_bound = model.points.copy(), model.bound.copy()
-    lost_bound[[row_of()[name] for name in corners]] = -1
-    lost_points[row_of()["3.1"]] = upper_lid + np.array([0, 0, 0.05])
+    lost_bound[[point_rows()[name] for name in corners]] = -1
+    lost_points[point_rows()["3.1"]] = upper_lid + np.array([0, 0, 0.05])
     lost = replace(model, points=lost_points, bound=lost_bound)
     assert author_lids(lost, {19: [shape], 21: [shape]}) == {}
 
@@ -86,10 +86,10 @@ def test_missing_points_lose_their_faps_alone(
     parts: list[Part], points: np.ndarray, bound: np.ndarray, faps_of: dict[str, set[int]]
 ) -> None:
     """Points of different regions, so that each reason must name its own."""
-    upper_lid = points[row_of()["3.1"]].copy()
+    upper_lid = points[point_rows()["3.1"]].copy()
     points, bound = without(points, bound, *faps_of)
     if "3.1" in faps_of:  # its height is needed for IRISD0
-        points[row_of()["3.1"]] = upper_lid + np.array([0, 0, 0.05])
+        points[point_rows()["3.1"]] = upper_lid + np.array([0, 0, 0.05])
     model = author(parts, points, bound=bound)
     assert set(model.lost) == set.union(*faps_of.values())
     for point, faps in faps_of.items():
@@ -99,7 +99,7 @@ def test_missing_points_lose_their_faps_alone(
 def test_a_point_far_from_the_mesh_is_named_with_its_distance(
     parts: list[Part], points: np.ndarray, bound: np.ndarray
 ) -> None:
-    row = row_of()["9.3"]
+    row = point_rows()["9.3"]
     points[row] += (0, 0, 0.05)
     bound[row] = -1
     model = author(parts, points, bound=bound)
@@ -112,7 +112,7 @@ def test_a_point_far_from_the_mesh_is_named_with_its_distance(
 
 def test_lips_that_are_one_cannot_part(parts: list[Part], points: np.ndarray, bound: np.ndarray) -> None:
     for upper, lower in (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9")):
-        bound[row_of()[lower]] = bound[row_of()[upper]]
+        bound[point_rows()[lower]] = bound[point_rows()[upper]]
     model = author(parts, points, bound=bound)
     assert "no opening" in model.lost[4]
     assert {4, 5} <= set(model.lost)
@@ -122,13 +122,13 @@ def test_lips_that_are_one_cannot_part(parts: list[Part], points: np.ndarray, bo
 def test_small_parts_on_the_skin_are_carried_and_others_are_not(
     parts: list[Part], points: np.ndarray, bound: np.ndarray
 ) -> None:
-    brow = points[row_of()["4.1"]]
+    brow = points[point_rows()["4.1"]]
     patch = np.array([(x, y, 0.0006) for y in (-0.001, 0.001) for x in (-0.003, 0, 0.003)])
     faces = np.array([(0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4)])
     extra = [
         Part("brow", "brow", brow + patch, faces),
-        Part("mole", "other", points[row_of()["5.1"]] + patch, faces),
-        Part("shirt", "other", points[row_of()["2.1"]] + patch * 40, faces),
+        Part("mole", "other", points[point_rows()["5.1"]] + patch, faces),
+        Part("shirt", "other", points[point_rows()["2.1"]] + patch * 40, faces),
         Part("hair", "hair", brow + patch, faces),
     ]
     model = author([*parts, *extra], points, bound=bound)
@@ -140,7 +140,7 @@ def test_small_parts_on_the_skin_are_carried_and_others_are_not(
 
 
 def test_lashes_turn_with_their_lid(parts: list[Part], points: np.ndarray, bound: np.ndarray) -> None:
-    root = points[row_of()["3.1"]] + (0, 0, 0.0002)
+    root = points[point_rows()["3.1"]] + (0, 0, 0.0002)
     hair = np.array([(-0.0005, 0, 0), (0.0005, 0, 0), (-0.0003, 0.001, 0.006), (0.0003, 0.001, 0.006)])
     lash = Part("lash", "lash", root + hair, np.array([(0, 1, 3), (0, 3, 2)]))
     model = author([*parts, lash], points, bound=bound)
@@ -177,7 +177,10 @@ def test_edges_of_three_triangles_and_doubled_ones_do_no_harm(
     parts: list[Part], points: np.ndarray, bound: np.ndarray
 ) -> None:
     skin = parts[0]
-    a, b = bound[row_of()["5.1"]], skin.triangles[(skin.triangles == bound[row_of()["5.1"]]).any(axis=1)][0]
+    a, b = (
+        bound[point_rows()["5.1"]],
+        skin.triangles[(skin.triangles == bound[point_rows()["5.1"]]).any(axis=1)][0],
+    )
     other = next(v for v in b if v != a)
     fin = skin.vertices[a] + (0.004, 0, 0.004)
     triangles = np.vstack([skin.triangles, [[a, other, len(skin.vertices)]], skin.triangles[:3]])
@@ -229,7 +232,7 @@ def test_points_in_another_unit_are_recognised(parts: list[Part], points: np.nda
 def test_bound_vertices_must_exist(
     parts: list[Part], points: np.ndarray, bound: np.ndarray, number: int
 ) -> None:
-    bound[row_of()["4.3"]] = number
+    bound[point_rows()["4.3"]] = number
     with pytest.raises(ModelError, match=rf"4\.3 is bound to vertex {number}"):
         author(parts, points, bound=bound)
 
@@ -244,7 +247,7 @@ def test_a_face_without_height_of_the_eye_opening_has_no_unit(
     parts: list[Part], points: np.ndarray, bound: np.ndarray
 ) -> None:
     for upper, lower in (("3.1", "3.3"), ("3.2", "3.4")):
-        bound[row_of()[lower]] = bound[row_of()[upper]]
+        bound[point_rows()[lower]] = bound[point_rows()[upper]]
     with pytest.raises(ModelError, match="IRISD0 is 0"):
         author(parts, points, bound=bound)
 
@@ -253,7 +256,10 @@ def test_a_point_of_a_lip_on_the_vertex_of_another_is_lost_alone(
     parts: list[Part], points: np.ndarray, bound: np.ndarray
 ) -> None:
     for point, other in (("2.6", "2.2"), ("8.8", "8.4")):
-        points[row_of()[point]], bound[row_of()[point]] = points[row_of()[other]], bound[row_of()[other]]
+        points[point_rows()[point]], bound[point_rows()[point]] = (
+            points[point_rows()[other]],
+            bound[point_rows()[other]],
+        )
     model = author(parts, points, bound=bound)
     assert model.lost == {
         8: "feature point 2.6 stands on the same vertex as 2.2, which has a FAP of its own",

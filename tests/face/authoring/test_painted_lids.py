@@ -14,10 +14,10 @@ from fba.face.authoring import author
 from fba.face.authoring.surface.landmarks import find_landmarks, weld_skin
 from fba.face.checks import check_faps
 from fba.face.checks._posing import Poser
-from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.model import FaceModel
 from fba.mesh._materials import read_pixels
+from fba.parameters import point_rows
 from small_head import small_head
 
 BAND = 0.0045
@@ -74,7 +74,7 @@ def follows(model: FaceModel, distance: np.ndarray) -> float:
     poser = Poser(model)
     way = np.linalg.norm(poser.pose(CLOSED) - poser.neutral, axis=1)
     skin = model.parts[0].vertices
-    middle, margin = model.points[row_of()["3.5"]], int(model.bound[row_of()["3.1"]])
+    middle, margin = model.points[point_rows()["3.5"]], int(model.bound[point_rows()["3.1"]])
     outer = (distance > BAND / 2) & (distance < BAND) & (abs(skin[:, 0] - middle[0]) < 0.006)
     outer &= (skin[:, 1] > skin[margin, 1]) & (skin[:, 2] > skin[margin, 2] - 0.001)
     assert outer.sum() >= 2
@@ -106,7 +106,7 @@ def dark_area(model: FaceModel, values: dict[int, float]) -> float:
     pixels = read_pixels(skin.material.texture)
     assert pixels is not None
     posed = Poser(model).pose(values)[: len(skin.vertices)]
-    eyes = model.points[[row_of()["3.5"], row_of()["3.6"]]]
+    eyes = model.points[[point_rows()["3.5"], point_rows()["3.6"]]]
     near = np.min([np.linalg.norm(skin.vertices - eye, axis=1) for eye in eyes], axis=0) < 0.025
     triangles = skin.triangles[near[skin.triangles].all(axis=1)]
     a, b, c = (posed[triangles[:, corner]] for corner in range(3))

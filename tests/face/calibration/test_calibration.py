@@ -19,12 +19,13 @@ from fba.face.calibration._field import turned_over_triangles
 from fba.face.checks._findings import Finding
 from fba.face.eyeball import eyeballs
 from fba.face.fapu import Fapu
-from fba.face.feature_points import MIRRORED, names, row_of
+from fba.face.feature_points import MIRRORED, names
 from fba.face.model import FaceModel, Part
 from fba.mesh._meshes import vertex_normals
+from fba.parameters import point_rows
 from small_head import EYE_RADIUS, small_head
 
-ROW = row_of()
+ROW = point_rows()
 RIGID = {"9.8", "9.9", "9.10", "9.11"}
 """Points of the teeth, which stay rigid."""
 SOFT = [row for name, row in ROW.items() if name not in RIGID]

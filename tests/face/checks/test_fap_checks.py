@@ -15,7 +15,7 @@ from fba.face.authoring import author
 from fba.face.checks import Finding, check_faps
 from fba.face.checks._fap_checks import check_posed
 from fba.face.checks._posing import Poser
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
 from grid_head import grid_head
 
 
@@ -46,7 +46,7 @@ def scaled(factor: float) -> Callable[[FaceDefMesh], FaceDefMesh]:
 
 def added(head: FaceModel, fap: int, point: str, step: tuple[float, float, float]) -> FaceModel:
     """The vertex of a feature point moves by `step` more, straight."""
-    number = int(head.bound[row_of()[point]])
+    number = int(head.bound[point_rows()[point]])
     part = next(p for p in reversed(head.parts) if head.starts[p.name] <= number)
     own = number - head.starts[part.name]
 
@@ -121,7 +121,7 @@ def test_a_mate_that_comes_along(head: FaceModel) -> None:
 def test_something_far_away_that_moves(head: FaceModel) -> None:
     found = check_faps(added(head, 63, "11.1", (0, 0.5, 0)), [63])
     region = next(finding for finding in found if finding.rule == "nothing moves outside its region")
-    assert f"vertex {head.bound[row_of()['11.1']]}" in region.found
+    assert f"vertex {head.bound[point_rows()['11.1']]}" in region.found
 
 
 def test_triangles_that_turn_over(head: FaceModel) -> None:

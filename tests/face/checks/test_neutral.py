@@ -12,11 +12,12 @@ from fba.face.checks._findings import Finding
 from fba.face.checks._locations import check_locations
 from fba.face.checks._neutral import check_neutral
 from fba.face.eyeball import eyeballs, pupil_diameter, sphere
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
 from fba.face.model import FaceModel, Part
+from fba.parameters import point_rows
 from small_head import EYE_RADIUS, adult_points, ball, small_head
 
-ROW = row_of()
+ROW = point_rows()
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,11 @@ from hypothesis import HealthCheck, given, settings
 
 from fba.errors import FormatError, ModelError
 from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
-from fba.face.feature_points import neutral_points, row_of
+from fba.face.feature_points import neutral_points
 from fba.face.gltf._storage import load
 from fba.face.model import FaceModel, Material
 from fba.gltf import Gltf, Surface, read_gltf, surfaces
-from fba.parameters import fap_numbers, faps
+from fba.parameters import fap_numbers, faps, point_rows
 from stored_models import assert_same, ball, face, models, picture
 
 
@@ -79,7 +79,7 @@ def typical(name: str) -> float:
         "dilate_l_pupil": (300, "3.1", "3.3"),
     }[name]
     height = neutral_points()[:, 1]
-    return float(height[row_of()[upper]] - height[row_of()[lower]]) * steps / 1024
+    return float(height[point_rows()[upper]] - height[point_rows()[lower]]) * steps / 1024
 
 
 def test_faps_are_morph_targets(tmp_path: Path) -> None:
@@ -197,7 +197,7 @@ def test_other_names_and_places(tmp_path: Path) -> None:
 
 
 def test_normals_are_made_unit() -> None:
-    part = ball("ball", "eye", neutral_points()[row_of()["3.5"]], Material(texture=picture()))
+    part = ball("ball", "eye", neutral_points()[point_rows()["3.5"]], Material(texture=picture()))
     slack = part.normals * np.float32(1.00001)
     normals = np.array([[0, 0, 2], [0, 0, 0], *slack[2:]], dtype=np.float32)
     found = replace(part, normals=normals).normals

@@ -10,7 +10,6 @@ import pytest
 from fba.face.authoring import author
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import eyeballs, fit_eyeball, flat_width
-from fba.face.feature_points import row_of
 from fba.face.importers._gltf import split_sides
 from fba.face.importers.assembly._definitions import define_by_shapes, named_shapes
 from fba.face.importers.assembly._landmarks import find_eyes
@@ -18,7 +17,7 @@ from fba.face.importers.assembly._outlines import mouth_points
 from fba.face.importers.assembly._pieces import assemble
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import FaceModel, Part
-from fba.parameters import fap_numbers
+from fba.parameters import fap_numbers, point_rows
 from small_head import small_head
 
 
@@ -172,7 +171,7 @@ def test_visemes_and_expressions_are_those_of_the_shapes(base: FaceModel) -> Non
 
 def test_a_shape_that_no_fap_can_show_leaves_ours(base: FaceModel) -> None:
     aside = np.zeros((len(base.part("skin").vertices), 3))
-    aside[base.bound[row_of()["2.2"]] - base.starts["skin"], 0] = 0.005
+    aside[base.bound[point_rows()["2.2"]] - base.starts["skin"], 0] = 0.005
     assert define_by_shapes(base, {"viseme_nn": {"skin": aside}}) is base
 
 
@@ -201,8 +200,8 @@ def test_eyes_of_a_model_with_flat_eyes_look_ahead(base: FaceModel) -> None:
     )
     points = base.points.copy()
     for name, x in (("3.5", 0.03), ("3.6", -0.03)):
-        points[row_of()[name]] = (x, 0.0, 0.001)
+        points[point_rows()[name]] = (x, 0.0, 0.001)
     model = author(parts, points)
     for eye in eyeballs(model).values():
-        pupil = model.points[row_of()["3.5" if eye.side == "left" else "3.6"]]
+        pupil = model.points[point_rows()["3.5" if eye.side == "left" else "3.6"]]
         np.testing.assert_allclose((pupil - eye.centre)[:2], 0, atol=1e-6)

@@ -18,7 +18,7 @@ from fba.face.authoring.surface.surface import weld_parts
 from fba.face.checks import check_faps
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import eyeballs
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers.assembly._joining import join_pieces
@@ -37,6 +37,7 @@ from fba.face.importers.assembly._symmetry import (
 from fba.face.importers.assembly.model import turn_outward
 from fba.face.model import FaceModel, Part
 from fba.gltf import read_gltf, surfaces
+from fba.parameters import point_rows
 from gltf_documents import Sheet
 from mesh_files import write_glb
 from small_head import ball, small_head
@@ -76,7 +77,7 @@ def test_the_margins_of_the_built_in_heads_eyes() -> None:
         loop = find_eye_loop(surface, eye.centre, eye.radius)
         found = lid_points_of_loop(surface.vertices, loop, eye.centre[0])
         for vertex, name in zip(found, names, strict=True):
-            away = np.linalg.norm(surface.vertices[vertex] - head.points[row_of()[name]])
+            away = np.linalg.norm(surface.vertices[vertex] - head.points[point_rows()[name]])
             # the inner corner has a caruncle, which a loop may go around on either side
             assert away < (0.0045 if name in ("3.8", "3.11") else 0.0015), (name, away)
 
@@ -163,7 +164,7 @@ def test_a_lid_moves_as_its_sculptor_closed_it(base: FaceModel) -> None:
     skin = sculpted[start : start + len(base.part("skin").vertices)].astype(np.float32)
     shaped = add_shapes(base, {"eyeBlink_L": {"skin": skin}})
     way = shift(shaped, 19, 1024)
-    margin = int(base.bound[row_of()["3.1"]])
+    margin = int(base.bound[point_rows()["3.1"]])
     np.testing.assert_allclose(way[margin, :2], closed[margin, :2], atol=0.03 * moved.max())
     ratio = np.linalg.norm(way[crease], axis=1) / moved[crease]
     assert 1.35 < float(np.median(ratio)) < 1.85
@@ -329,7 +330,7 @@ def test_heads_with_given_points_are_stood_upright(base: FaceModel, axis: int, d
     _, points, angle = stand_upright_by_points([], turned_points(base, axis, degrees, 0.0005))
     assert np.degrees(angle) == pytest.approx(abs(degrees), abs=0.4)
     for left in ("3.7", "2.4", "4.5"):
-        way = points[row_of()[left]] - points[row_of()[MIRRORED[left]]]
+        way = points[point_rows()[left]] - points[point_rows()[MIRRORED[left]]]
         assert np.degrees(np.arccos(way[0] / np.linalg.norm(way))) < 2.0
 
 
@@ -338,7 +339,7 @@ def test_points_that_tremble_turn_nothing(base: FaceModel) -> None:
     assert stand_upright_by_points([], given)[2] == 0.0
     # the points of one side, or of a face seen from behind, do not say how it is turned
     one_side = given.copy()
-    one_side[[row_of()[name] for name in MIRRORED]] = np.nan
+    one_side[[point_rows()[name] for name in MIRRORED]] = np.nan
     assert stand_upright_by_points([], one_side)[2] == 0.0
     assert stand_upright_by_points([], given * (-1, 1, -1))[2] == 0.0
 
@@ -352,8 +353,8 @@ def test_pieces_are_turned_with_their_points(base: FaceModel) -> None:
     pieces, points, _ = stand_upright_by_points(
         [Piece(tilted, morphs={"jawOpen": (shape @ turn.T).astype(np.float32)})], base.points @ turn.T
     )
-    bound = base.bound[row_of()["9.3"]]
-    np.testing.assert_allclose(pieces[0].part.vertices[bound], points[row_of()["9.3"]], atol=1e-6)
+    bound = base.bound[point_rows()["9.3"]]
+    np.testing.assert_allclose(pieces[0].part.vertices[bound], points[point_rows()["9.3"]], atol=1e-6)
     np.testing.assert_allclose(pieces[0].morphs["jawOpen"], shape, atol=1e-5)
 
 

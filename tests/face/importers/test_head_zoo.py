@@ -16,13 +16,13 @@ from fba.errors import ModelError
 from fba.face.checks import check_faps
 from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
-from fba.face.feature_points import MIRRORED, names, row_of
+from fba.face.feature_points import MIRRORED, names
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces, locate
 from fba.face.importers.assembly._symmetry import MIRRORED_LIDS
 from fba.face.importers.assembly.model import ImportOptions
 from fba.face.model import FaceModel
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 from mesh_files import write_points
 from zoo_heads import ACTIONS, MADE_UP, MAKERS, Maker, original, write
 
@@ -75,9 +75,9 @@ def test_points_that_show_are_found(which: str, plain: dict[str, np.ndarray]) ->
     model = original(which)
     away = np.linalg.norm(plain[which] - model.points, axis=1) * 62 / (model.fapu.ES * 1024)
     if which == "grid":
-        away[[row_of()[name] for name in BACK]] = 0
+        away[[point_rows()[name] for name in BACK]] = 0
     for name, most in SHOWN.items():
-        assert away[row_of()[name]] < most, (name, away[row_of()[name]])
+        assert away[point_rows()[name]] < most, (name, away[point_rows()[name]])
     fapu, wanted = Fapu.measure(plain[which]), model.fapu
     for unit, share in (("ES", 0.001), ("IRISD", 0.03), ("ENS", 0.05), ("MNS", 0.08), ("MW", 0.07)):
         assert fapu[unit] == pytest.approx(wanted[unit], rel=share), unit
@@ -96,19 +96,19 @@ def test_every_convention_says_the_same(
     assert uneven < MIRRORED_LIDS
     apart = np.linalg.norm(found - plain[which], axis=1) * 1000
     if set(maker.shapes.values()) & set(ACTIONS) or maker.shapes["jawOpen"].startswith("head_"):
-        apart[[row_of()[name] for name in BACK]] = 0
+        apart[[point_rows()[name] for name in BACK]] = 0
         assert np.nanmax(apart) < 0.01
         return
     # without a smile, the corners of the mouth are where the lips part last
     away = np.linalg.norm(found - original(which).points, axis=1) * 1000
     for name, most in SHOWN.items():
         if name not in BACK:
-            assert away[row_of()[name]] < most, (name, away[row_of()[name]])
+            assert away[point_rows()[name]] < most, (name, away[point_rows()[name]])
     width = Fapu.measure(found).MW
     assert width == pytest.approx(original(which).fapu.MW, rel=0.05)
     for left, right in MIRRORED.items():
         np.testing.assert_allclose(
-            found[row_of()[left]] * (-1, 1, 1), found[row_of()[right]], atol=1e-5, err_msg=left
+            found[point_rows()[left]] * (-1, 1, 1), found[point_rows()[right]], atol=1e-5, err_msg=left
         )
 
 
@@ -130,7 +130,7 @@ def check_motions(model: FaceModel) -> None:
         values[fap.number - 1] = value
         if fap.lip_mate is not None:  # alone, a contour stops where it meets the other one of its lip
             values[fap.lip_mate - 1] = value
-        moved = (deform.feature_points(values) - rest)[row_of()[fap.feature_points[0]]]
+        moved = (deform.feature_points(values) - rest)[point_rows()[fap.feature_points[0]]]
         wanted = value * model.fapu[fap.unit] * np.array(WAYS[fap.positive])
         if fap.name == "open_jaw" or "eyelid" in fap.name:  # on arcs
             moved, wanted = moved[1:2], wanted[1:2]
@@ -150,7 +150,7 @@ def check_symmetry(model: FaceModel) -> None:
     places = deform.feature_points(values)
     for left, right in MIRRORED.items():
         np.testing.assert_allclose(
-            places[row_of()[left]] * (-1, 1, 1), places[row_of()[right]], atol=1e-6, err_msg=left
+            places[point_rows()[left]] * (-1, 1, 1), places[point_rows()[right]], atol=1e-6, err_msg=left
         )
 
 
@@ -184,7 +184,7 @@ def test_given_points_stay_where_they_are(which: str, tmp_path: Path) -> None:
     write_points(tmp_path / "head.points.csv", truth)
     with pytest.warns(Warning, match="none of the 9 shapes"):
         model = import_model(tmp_path / "head.glb")
-    pupils = truth.points[[row_of()["3.5"], row_of()["3.6"]]].mean(axis=0)
+    pupils = truth.points[[point_rows()["3.5"], point_rows()["3.6"]]].mean(axis=0)
     bound = truth.bound >= 0
     np.testing.assert_allclose(model.points[bound], (truth.points - pupils)[bound], atol=1e-5)
     assert len(names()) > bound.sum() > 75

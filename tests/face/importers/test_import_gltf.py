@@ -11,13 +11,12 @@ from fba.errors import FbaWarning, ModelError
 from fba.face.authoring import add_shapes, author
 from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
-from fba.face.feature_points import row_of
 from fba.face.gltf.morphs import displacements
 from fba.face.importers import import_model
 from fba.face.importers.assembly._landmarks import find_points
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import FaceModel
-from fba.parameters import fap_numbers, faps
+from fba.parameters import fap_numbers, faps, point_rows
 from mesh_files import write_glb, write_points
 from small_head import small_head
 
@@ -68,7 +67,7 @@ def sculpted(base: FaceModel) -> tuple[dict[str, dict[str, np.ndarray]], np.ndar
         ),
     )
     vertices = base.part("skin").vertices.astype(np.float64)
-    points = base.points[[row_of()[name] for name in ("4.1", "4.3", "4.5")]]
+    points = base.points[[point_rows()[name] for name in ("4.1", "4.3", "4.5")]]
     spot = points[1] * 0.5 + points[0] * 0.5 + (0, 0.004, 0)
     away = np.linalg.norm(vertices - spot, axis=1)
     swelling = np.zeros_like(vertices)
@@ -118,10 +117,10 @@ def test_points_move_exactly_and_others_stay(shaped: FaceModel, fap: str, value:
     moved = deform.feature_points(pose(**{fap: small})) - deform.feature_points(np.zeros(68))
     way = {"up": (0, 1, 0), "left": (1, 0, 0)}[entry.positive]
     expected = small * shaped.fapu[entry.unit] * np.array(way)
-    row = row_of()[entry.feature_points[0]]
+    row = point_rows()[entry.feature_points[0]]
     np.testing.assert_allclose(moved[row], expected, atol=0.05 * np.linalg.norm(expected))
     mate = faps()[(entry.left_right_mate or 0) - 1].feature_points[0]
-    assert np.linalg.norm(moved[row_of()[mate]]) < 0.02 * np.linalg.norm(expected)
+    assert np.linalg.norm(moved[point_rows()[mate]]) < 0.02 * np.linalg.norm(expected)
 
 
 def test_no_triangle_turns_over_at_the_limits(shaped: FaceModel) -> None:
@@ -222,7 +221,7 @@ def test_feature_points_of_an_unmarked_head_are_found() -> None:
     for unit in ("IRISD", "ES", "ENS", "MNS", "MW"):
         assert fapu[unit] == pytest.approx(wanted[unit], rel=0.12), unit
     away = np.linalg.norm(found - head.points, axis=1) * 1000
-    row = row_of()
+    row = point_rows()
     # The ears are an average adult's: nothing shows where they are.
     for name, most in (
         ("3.1", 1.5), ("3.2", 1.5), ("3.3", 2), ("3.4", 2), ("2.2", 2), ("2.3", 2), ("8.3", 5), ("8.4", 5),

@@ -11,11 +11,11 @@ import pytest
 from fba.errors import ModelError, OptionError
 from fba.face.checks import check_neutral
 from fba.face.deform._deformer import Deformer
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
 from fba.face.importers import import_model
 from fba.face.importers.makehuman.makehuman import read_makehuman
 from fba.face.model import FaceModel
-from fba.parameters import fap_numbers
+from fba.parameters import fap_numbers, point_rows
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_head_and_neck_with_parts_of_their_kinds(model: FaceModel) -> None:
 
 def test_feature_points_are_symmetric_and_on_their_vertices(model: FaceModel) -> None:
     assert model.missing == ()
-    row = row_of()
+    row = point_rows()
     for left, right in MIRRORED.items():
         np.testing.assert_allclose(
             model.points[row[left]], model.points[row[right]] * (-1, 1, 1), atol=2e-5, err_msg=left
@@ -100,7 +100,7 @@ def test_faps_by_the_standard(
     faps = np.zeros(68)
     rest = deform.feature_points(faps)
     faps[fap_numbers()[fap] - 1] = value
-    moved = (deform.feature_points(faps) - rest)[row_of()[point]]
+    moved = (deform.feature_points(faps) - rest)[point_rows()[point]]
     expected = value * model.fapu[unit] * np.array(way)
     np.testing.assert_allclose(moved, expected, atol=0.05 * np.linalg.norm(expected))
 
@@ -111,7 +111,7 @@ def test_the_file_itself_and_a_folder_without_fitted_eyes(folder: Path, tmp_path
     eye = next(part for part in head.parts if part.name == "left eye")
     assert eye.material.texture is None
     assert len(np.unique(eye.vertices, axis=0)) == 72  # vertices 14598 to 14669 of the base mesh
-    assert head.bound[row_of()["3.5"]] >= 0
+    assert head.bound[point_rows()["3.5"]] >= 0
     assert np.isfinite(head.points).all()
     with pytest.raises(OptionError, match="has its own"):
         import_model(tmp_path, points={"9.3": 1})

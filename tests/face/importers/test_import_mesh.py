@@ -9,12 +9,11 @@ import pytest
 
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face.deform._deformer import Deformer
-from fba.face.feature_points import row_of
 from fba.face.importers import import_model
 from fba.face.importers.assembly._pieces import guess_kind
 from fba.face.importers.assembly.model import metres_per_unit
 from fba.face.model import FaceModel
-from fba.parameters import fap_numbers
+from fba.parameters import fap_numbers, point_rows
 from mesh_files import ply, write_obj, write_points
 from small_head import small_head
 
@@ -30,7 +29,7 @@ def moved(model: FaceModel, fap: str, value: float, point: str) -> np.ndarray:
     deform = Deformer(model)
     at_rest = deform.feature_points(faps)
     faps[fap_numbers()[fap] - 1] = value
-    return (deform.feature_points(faps) - at_rest)[row_of()[point]]
+    return (deform.feature_points(faps) - at_rest)[point_rows()[point]]
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +62,7 @@ def test_units_origin_and_points_are_those_of_the_head(imported: FaceModel, head
     np.testing.assert_allclose(imported.fapu.MNS, head.fapu.MNS, rtol=1e-3)
     assert imported.notes["unit"].startswith("in centimetres")
     for name in ("2.2", "2.3", "8.3", "9.3"):
-        row = row_of()[name]
+        row = point_rows()[name]
         np.testing.assert_allclose(imported.vertices[imported.bound[row]], head.points[row], atol=2e-6)
 
 
@@ -78,7 +77,7 @@ def test_triangles_are_turned_outwards(imported: FaceModel, head: FaceModel) -> 
         np.cross(b - a, c - a).sum(axis=0), np.cross(q - p, r - p).sum(axis=0), atol=1e-8
     )
     # the tip of the nose looks forward
-    normal = imported.normals[imported.bound[row_of()["9.3"]]]
+    normal = imported.normals[imported.bound[point_rows()["9.3"]]]
     assert normal[2] > 0.5
 
 
@@ -166,7 +165,7 @@ def test_missing_and_contradicting_points(head: FaceModel, tmp_path: Path) -> No
         import_model(tmp_path / "face.obj", points={"9.3": 99999999})
     with pytest.raises(ModelError, match=r"face\.obj: the pupils .*3\.5 and 3\.6\) are missing"):
         import_model(tmp_path / "face.obj", points={"9.3": 1, "2.1": 2})
-    row = row_of()
+    row = point_rows()
     few = {name: head.points[row[name]].tolist() for name in ("3.5", "3.6", "9.3", "9.15")}
     with pytest.raises(ModelError, match=r"face\.obj: .*IRISD0"):
         import_model(tmp_path / "face.obj", points=few)
@@ -217,8 +216,8 @@ def test_kinds_by_name(names: tuple[str, ...], kind: str | None) -> None:
 )
 def test_units_by_the_distance_of_the_pupils(apart: float, size: float) -> None:
     points = np.full((84, 3), np.nan)
-    points[row_of()["3.5"]] = (apart / 2, 0, 0)
-    points[row_of()["3.6"]] = (-apart / 2, 0, 0)
+    points[point_rows()["3.5"]] = (apart / 2, 0, 0)
+    points[point_rows()["3.6"]] = (-apart / 2, 0, 0)
     assert metres_per_unit(points)[0] == pytest.approx(size)
     assert metres_per_unit(points, 0.5)[0] == 0.5
 

@@ -10,9 +10,10 @@ import pytest
 
 from fba.errors import FbaWarning, ModelError
 from fba.face.fapu import Fapu
-from fba.face.feature_points import neutral_points, row_of
+from fba.face.feature_points import neutral_points
 from fba.face.importers.points.fdp import read_fdp, read_fdp_points
 from fba.face.importers.points.points_file import given_points, read_points
+from fba.parameters import point_rows
 
 XFACE = """<?xml version="1.0"?><xfdp><head><file version="0.2"/>
 <fapu ENS0="51" ES0="69" IRISD0="16" MNS0="30" MW0="50"/></head>
@@ -37,11 +38,11 @@ def test_csv(tmp_path: Path) -> None:
     file.write_text('point,x,y,z\n# comment\n"9.3",0,-0.5,1e1\n\n2.1,17\n')
     given = read_points(file)
     assert given.vertices == {"2.1": 17}
-    np.testing.assert_array_equal(given.points[row_of()["9.3"]], [0, -0.5, 10])
+    np.testing.assert_array_equal(given.points[point_rows()["9.3"]], [0, -0.5, 10])
     assert np.isfinite(given.points).all(axis=1).sum() == 1
     for separator in (";", "\t", "  "):
         file.write_text(separator.join(["9.3", "0", "-0.5", "10"]) + "\n")
-        np.testing.assert_array_equal(read_points(file).points[row_of()["9.3"]], [0, -0.5, 10])
+        np.testing.assert_array_equal(read_points(file).points[point_rows()["9.3"]], [0, -0.5, 10])
 
 
 @pytest.mark.parametrize(
@@ -74,7 +75,7 @@ def test_json(tmp_path: Path) -> None:
     file.write_text(json.dumps({"points": {"9.3": [0, 1, 2], "2.1": 5}}))
     given = read_points(file)
     assert given.vertices == {"2.1": 5}
-    np.testing.assert_array_equal(given.points[row_of()["9.3"]], [0, 1, 2])
+    np.testing.assert_array_equal(given.points[point_rows()["9.3"]], [0, 1, 2])
     for bad in ("{", "[]", '{"9.3": "here"}', '{"9.3": [1, 2]}', '{"9.3": true}', '{"x": 1}', "[" * 100000):
         file.write_text(bad)
         with pytest.raises(ModelError, match=r"p\.json"):
@@ -93,7 +94,7 @@ def text_fdp(points: np.ndarray, **changed: str) -> str:
     lines = ["# FDP file", "1.0 test 0 0 0 0 0 0"]
     lines += [
         f"  {n} {x:.6f} {y:.6f} {z:.6f} 0.{r}"
-        for (n, r), (x, y, z) in zip(row_of().items(), points, strict=True)
+        for (n, r), (x, y, z) in zip(point_rows().items(), points, strict=True)
     ]
     return "\r\n".join([*lines, *changed.values(), "NUL 0", "NLL 0"])
 
@@ -104,14 +105,14 @@ def test_text_fdp_gives_points_and_vertices(tmp_path: Path) -> None:
     fdp = read_fdp(file)
     np.testing.assert_allclose(fdp.points, neutral_points(), atol=1e-6)
     # "0.10" is vertex 10 of mesh 0, not a tenth
-    assert fdp.vertices["2.12"] == ("0", row_of()["2.12"])
-    assert [name for name, row in row_of().items() if row == 10] == [
+    assert fdp.vertices["2.12"] == ("0", point_rows()["2.12"])
+    assert [name for name, row in point_rows().items() if row == 10] == [
         name for name, (_, vertex) in fdp.vertices.items() if vertex == 10
     ]
 
 
 def test_wrong_sides_are_put_right_with_a_warning(tmp_path: Path) -> None:
-    points, row = neutral_points().copy(), row_of()
+    points, row = neutral_points().copy(), point_rows()
     points[row["10.10"], 0] *= -1
     points[[row["3.8"], row["3.12"]]] = points[[row["3.12"], row["3.8"]]]
     points[[row["4.1"], row["4.2"]]] = points[[row["4.2"], row["4.1"]]]
@@ -154,8 +155,8 @@ def test_xface_names_vertices_of_its_meshes(tmp_path: Path) -> None:
         read_fdp_points(file)
     (tmp_path / "head.wrl").write_text(WORLD)
     points = read_fdp_points(file)
-    np.testing.assert_array_equal(points[row_of()["9.3"]], [0, 10, 5])
-    np.testing.assert_array_equal(points[row_of()["3.5"]], [3, 1, 2])
+    np.testing.assert_array_equal(points[point_rows()["9.3"]], [0, 10, 5])
+    np.testing.assert_array_equal(points[point_rows()["3.5"]], [3, 1, 2])
     assert np.isfinite(points).all(axis=1).sum() == 2
 
 

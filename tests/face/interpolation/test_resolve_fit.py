@@ -192,7 +192,7 @@ def test_sent_values_show_as_they_are(whole: FaceTrack) -> None:
 
 def test_an_hour_is_resolved_in_bounded_steps() -> None:
     """Blocks of any length: the border of the internal blocks shows nowhere."""
-    from fba.face.resolve import RESOLVED_AT_ONCE
+    from fba.face._resolve import RESOLVED_AT_ONCE
 
     count = RESOLVED_AT_ONCE + 3
     values, mask = np.zeros((count, 68), dtype=int), np.zeros((count, 68), dtype=bool)

@@ -10,10 +10,10 @@ import pytest
 import fba
 from fba import rotations
 from fba.arrays import Float64
-from fba.capture import ActionUnitMotion, from_action_units
+from fba.capture import ActionUnitMotion, from_action_units, shape_faps
 from fba.capture.blendshapes.action_units import unit_shapes
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
 from fba.errors import FbaWarning, FormatError, ModelError
+from fba.face import arkit_names
 from fba.formats import format_of
 from fba.formats.face_tables import _openface as openface
 from fba.formats.face_tables import _pyfeat as pyfeat
@@ -194,14 +194,14 @@ def shown(units: dict[int, Float64 | float]) -> dict[str, int]:
 def test_action_units_do_what_facs_says() -> None:
     assert set(UNITS) <= set(unit_shapes())
     for unit, shapes in unit_shapes().items():
-        assert set(shapes) <= set(ARKIT_ORDER), unit
+        assert set(shapes) <= set(arkit_names()), unit
     assert shown({1: 1.0})["raise_l_i_eyebrow"] > 200
     assert shown({4: 1.0})["raise_r_i_eyebrow"] < -100 < 0 < shown({4: 1.0})["squeeze_r_eyebrow"]
     smile, frown = shown({12: 1.0}), shown({15: 1.0})
     assert smile["raise_l_cornerlip"] == smile["raise_r_cornerlip"] > 400 > -200 > frown["raise_l_cornerlip"]
     closed = shown({45: 1.0})
     assert closed["close_t_l_eyelid"] + closed["close_b_l_eyelid"] == 1024
-    jaw = amounts_of("jawOpen")
+    jaw = shape_faps("jawOpen")
     assert jaw is not None
     assert shown({26: 0.5})["open_jaw"] == round(0.25 * jaw[2])
     assert shown({43: 1.0, 45: 1.0}) == closed  # of units that do the same, none is added

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fba
-from fba.capture.blendshapes.shape_table import amounts_of
+from fba.capture import shape_faps
 from fba.errors import FbaWarning, FormatError
 from fba.face._expressions import Definitions
 from fba.gltf import read_gltf
@@ -141,16 +141,16 @@ def test_unknown_targets_are_named(tmp_path: Path) -> None:
 
 
 def test_names_in_all_spellings() -> None:
-    jaw = amounts_of("jawOpen")
+    jaw = shape_faps("jawOpen")
     assert jaw is not None
     for name in ("jaw_open", "blendShape1.jawOpen", "JawOpen"):
-        other = amounts_of(name)
+        other = shape_faps(name)
         assert other is not None
         np.testing.assert_array_equal(other, jaw)
-    smile = amounts_of("mouthSmile_R")
+    smile = shape_faps("mouthSmile_R")
     assert smile is not None
     assert smile[fap_numbers()["raise_r_cornerlip"] - 1] == 550
-    assert amounts_of("Wobble") is None
+    assert shape_faps("Wobble") is None
 
 
 def test_both_ends_of_a_take_of_blender(tmp_path: Path) -> None:

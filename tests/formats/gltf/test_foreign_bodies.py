@@ -9,8 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fba
-from fba.body import BapSolver, Skeleton
-from fba.body.model import BodyModel
+from fba.body import BapSolver, BodyModel, Skeleton
 from fba.errors import FbaWarning, FormatError
 from fba.formats.gltf.bodies import import_body
 from fba.parameters import baps

@@ -14,9 +14,9 @@ import pytest
 
 import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.face.resolve import resolve
+from fba.face import resolve
 from fba.gltf import read_gltf
 from fba.parameters import BAP_COUNT, FAP_COUNT, fap_numbers
 from gltf_edits import document, edit

@@ -16,15 +16,12 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import fba
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba.body import BapSolver, Skeleton
-from fba.body.footing import GroundedPoser
-from fba.body.head_attachment import attach_head
-from fba.body.model import BodyModel
+from fba.body import BapSolver, BodyModel, GroundedPoser, Skeleton, attach_head
 from fba.errors import FormatError, ModelError
 from fba.face.deform._deformer import Deformer
-from fba.face.model import FaceModel, point_row
+from fba.face.model import FaceModel
 from fba.gltf import Gltf, read_gltf
-from fba.parameters import BAP_COUNT, FAP_COUNT, bap_numbers, baps, fap_numbers
+from fba.parameters import BAP_COUNT, FAP_COUNT, bap_numbers, baps, fap_numbers, point_rows
 from gltf_edits import edit
 
 SCRIPT = """
@@ -184,7 +181,7 @@ def test_every_vertex_is_where_body_and_face_are(written: Path, frame: int) -> N
     skull = np.concatenate(
         [np.full(len(p.vertices), p.kind in ("eye", "teeth", "tongue", "brow", "lash")) for p in face.parts]
     )
-    head = attach_head(body, face.vertices, face.points[[point_row("3.5"), point_row("3.6")]], skull)
+    head = attach_head(body, face.vertices, face.points[[point_rows()["3.5"], point_rows()["3.6"]]], skull)
     matrices = head.matrices(matrices, move.head_matrices(faps))
     wanted_face = head.skin(move.local(faps), matrices, method="linear")
     wanted_body = body.skin(matrices, method="linear")

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers import MarkerMapping, VirtualMarker, head_of_model, move_head
-from fba.face.feature_points import row_of
 from fba.formats.gltf.moved_head import write_moved_head
+from fba.parameters import point_rows
 from small_head import small_head
 
 MARKED = ("2.1", "8.1", "8.2", "8.3", "8.4", "9.3", "11.1", "11.2", "11.3")
@@ -34,7 +34,7 @@ def capture(frames: int = 20) -> MarkerMotion:
 def mapping() -> MarkerMapping:
     bound = small_head().bound
     return MarkerMapping(
-        {name: VirtualMarker(int(bound[row_of()[name]]), 0.02, 0.02, name in FIXED) for name in MARKED}
+        {name: VirtualMarker(int(bound[point_rows()[name]]), 0.02, 0.02, name in FIXED) for name in MARKED}
     )
 
 

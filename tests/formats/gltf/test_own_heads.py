@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fba.body.own_head import HeadShape, OwnHead
-from fba.capture.blendshapes.shape_table import amounts_of
+from fba.capture import shape_faps
 from fba.formats.gltf.bodies import import_body
 from fba.parameters import FAP_COUNT, fap_numbers
 from gltf_edits import edit
@@ -46,7 +46,7 @@ def test_shapes_with_known_names_move_the_head(tmp_path: Path) -> None:
     moved[HEAD] = 0
     assert not moved.any()
     assert not risen(path, faps(close_t_r_eyelid=1024)).any()
-    jaw = amounts_of("jawOpen")
+    jaw = shape_faps("jawOpen")
     assert jaw is not None
     np.testing.assert_allclose(risen(path, jaw / 2)[HEAD, 1], RISE / 2, rtol=0.03)
 
@@ -74,7 +74,7 @@ def test_expressions_that_vrm_declares(tmp_path: Path, extension: str) -> None:
             content["expressions"] = {"preset": {"aa": {"morphTargetBinds": binds}}}
 
     edit(path, declare)
-    open_mouth = amounts_of("aa")
+    open_mouth = shape_faps("aa")
     assert open_mouth is not None
     np.testing.assert_allclose(risen(path, open_mouth)[HEAD, 1], 0.4 * RISE, rtol=0.02)
 

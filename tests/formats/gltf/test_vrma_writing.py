@@ -11,7 +11,7 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, FaceTrack
-from fba.capture.blendshapes.shape_table import amounts_of
+from fba.capture import shape_faps
 from fba.errors import FbaWarning, FormatError
 from fba.parameters import fap_numbers
 
@@ -23,7 +23,7 @@ def face(shapes: dict[str, np.ndarray], turns: dict[str, float] | None = None) -
     """Return the FAPs of expressions with weights (T,), and of turns in radians that grow from 0."""
     values = np.zeros((FRAMES, 68))
     for name, weights in shapes.items():
-        amounts = amounts_of(name)
+        amounts = shape_faps(name)
         assert amounts is not None
         values += weights[:, None] * amounts
     for name, angle in (turns or {}).items():

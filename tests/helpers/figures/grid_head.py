@@ -10,8 +10,9 @@ from scipy.interpolate import RBFInterpolator
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
 from fba.face.model import Part
+from fba.parameters import point_rows
 from small_head import adult_points, ball
 
 COLUMNS, ROWS = 57, 67
@@ -21,11 +22,11 @@ EYE_HALF = (4, 2)
 """Cells from the middle of an eye's hole to its corner and to its lid."""
 FACE_POINTS = [
     name
-    for name in row_of()
+    for name in point_rows()
     if name.split(".")[0] in {"2", "3", "4", "5", "8", "9", "11"}
     and name not in {"3.5", "3.6", "9.8", "9.9", "9.10", "9.11", "11.4", "11.5", "11.6"}
 ]
-EAR_POINTS = [name for name in row_of() if name.startswith("10.")]
+EAR_POINTS = [name for name in point_rows() if name.startswith("10.")]
 LIDS = {"left": ("3.11", "3.1", "3.7", "3.3"), "right": ("3.8", "3.2", "3.12", "3.4")}
 LOWER_LIP = ("2.3", "2.8", "2.9")
 
@@ -36,7 +37,7 @@ def grid_head(*, eyes: bool = True, mouth: bool = True) -> tuple[list[Part], np.
     eyes, mouth: whether there are eyeballs, and teeth and tongue.
     """
     points = adult_points().copy()
-    row = row_of()
+    row = point_rows()
     skin, vertex = _mask(points)
     parts = [skin]
     bound = np.full(len(row), -1)
@@ -59,7 +60,7 @@ def grid_head(*, eyes: bool = True, mouth: bool = True) -> tuple[list[Part], np.
 
 
 def _mask(points: np.ndarray) -> tuple[Part, dict[str, int]]:
-    row = row_of()
+    row = point_rows()
     xs, ys = np.linspace(-WIDTH, WIDTH, COLUMNS), np.linspace(BOTTOM, TOP, ROWS)
     plane = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
     number = np.arange(ROWS * COLUMNS).reshape(ROWS, COLUMNS)
@@ -210,7 +211,7 @@ def _off_eyes(
     del fixed
     result = skin.copy()
     for name in ("3.5", "3.6"):
-        centre = points[row_of()[name]] - (0, 0, EYE_RADIUS)
+        centre = points[point_rows()[name]] - (0, 0, EYE_RADIUS)
         arm = skin - centre
         flat = np.hypot(arm[:, 0], arm[:, 1])
         reach = 1.04 * EYE_RADIUS
@@ -225,7 +226,7 @@ def _with_ears(
     skin: np.ndarray, triangles: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
     """Two flaps that stand off the sides of the mask, hung on its rim."""
-    row, vertex = row_of(), {}
+    row, vertex = point_rows(), {}
     for side, names in (
         ("left", ("10.1", "10.3", "10.5", "10.7", "10.9")),
         ("right", ("10.2", "10.4", "10.6", "10.8", "10.10")),
@@ -267,7 +268,7 @@ def _through(line: list[np.ndarray], share: float) -> np.ndarray:
 
 
 def _inside(points: np.ndarray) -> list[tuple[Part, dict[str, int]]]:
-    row = row_of()
+    row = point_rows()
     found = []
     for jaw, edge, root in (("upper", "9.10", "9.8"), ("lower", "9.11", "9.9")):
         turn = np.linspace(-1.2, 1.2, 25)

@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from fba.body import Skeleton
-from fba.body.model import BodyModel, BodyPart
+from fba.body import BodyModel, BodyPart, Skeleton
 from fba.mesh._meshes import Material
 
 Float64 = npt.NDArray[np.float64]

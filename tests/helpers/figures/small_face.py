@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fba.face._tables import FaceDefMesh, FaceDefTables
-from fba.face.model import FaceModel, Part, point_row
+from fba.face.model import FaceModel, Part
+from fba.parameters import point_rows
 from fba_player._mesh.primitives import sphere_mesh
 
 
@@ -19,7 +20,7 @@ def small_face(*kinds: str, scale: float = 1.0) -> FaceModel:
     sphere, inwards = sphere_mesh(10, 16)
     triangles = inwards[:, ::-1]
     skin = sphere * (0.075, 0.115, 0.095) + (0.0, -0.01, -0.03)
-    chin = head.points[point_row("2.1")]
+    chin = head.points[point_rows()["2.1"]]
     lowest = int(skin[:, 1].argmin())
     skin[lowest] = chin
     parts = [Part("skin", "skin", (skin * scale).astype(np.float32), triangles)]
@@ -32,7 +33,7 @@ def small_face(*kinds: str, scale: float = 1.0) -> FaceModel:
         parts = [part for part in parts if part.kind in kinds]
     bound = np.full(len(head.points), -1)
     if parts[0].kind == "skin":
-        bound[point_row("2.1")] = lowest
+        bound[point_rows()["2.1"]] = lowest
     names = {part.name for part in parts} | {"head"}
     tables = []
     for number in (23, 24, 25, 26, 48, 49, 50):

@@ -10,13 +10,14 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import Delaunay
 
-from fba.face.feature_points import MIRRORED, row_of
+from fba.face.feature_points import MIRRORED
 from fba.face.model import FaceModel, Part
+from fba.parameters import point_rows
 
 EYE_RADIUS = 0.012
 ON_SKIN = [
     name
-    for name in row_of()
+    for name in point_rows()
     if name.split(".")[0] in {"2", "3", "4", "5", "8", "9", "11"}
     and name not in {"3.5", "3.6", "9.8", "9.9", "9.10", "9.11", "11.4", "11.5", "11.6"}
 ]
@@ -26,19 +27,19 @@ UPPER_LIP, LOWER_LIP = ("2.2", "2.6", "2.7"), ("2.3", "2.8", "2.9")
 @cache
 def adult_points() -> np.ndarray:
     """(84, 3) metres, symmetric: an adult by published norms, as the standard wants a neutral face."""
-    points = np.full((len(row_of()), 3), np.nan)
+    points = np.full((len(point_rows()), 3), np.nan)
     for row in csv.DictReader(Path(__file__).with_name("adult.csv").read_text().splitlines()):
         place = np.array([float(row[axis]) for axis in "xyz"]) / 1000
-        points[row_of()[row["point"]]] = place
+        points[point_rows()[row["point"]]] = place
         if row["point"] in MIRRORED:
-            points[row_of()[MIRRORED[row["point"]]]] = place * (-1, 1, 1)
+            points[point_rows()[MIRRORED[row["point"]]]] = place * (-1, 1, 1)
     return points
 
 
 def small_head(points: np.ndarray | None = None, cell: float = 0.006) -> FaceModel:
     """No tables; about 1000 vertices with the default cell size in metres."""
     points = adult_points().copy() if points is None else points
-    row = row_of()
+    row = point_rows()
     skin, bound = _mask(points, cell)
     parts = [skin]
     for side, name in (("left", "3.5"), ("right", "3.6")):
@@ -90,7 +91,7 @@ _BOX = np.array(
 
 def _mask(points: np.ndarray, cell: float) -> tuple[Part, np.ndarray]:
     """Two sheets, above and below the line of the lips, with holes for the eyes, through every point."""
-    row = row_of()
+    row = point_rows()
     known = points[[row[name] for name in ON_SKIN]]
     planar, first = np.unique(known[:, :2].round(6), axis=0, return_index=True)
     depth = RBFInterpolator(planar, known[first, 2], kernel="thin_plate_spline")

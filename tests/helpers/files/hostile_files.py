@@ -364,7 +364,7 @@ def load_face(path: Path) -> object:
 
 def load_body(path: Path) -> object:
     """Load a body model."""
-    from fba.body.model import BodyModel
+    from fba.body import BodyModel
 
     return BodyModel.load(path)
 
@@ -539,7 +539,7 @@ def read_markers(path: Path) -> object:
 
 
 def _markers() -> dict[str, HostileFile]:
-    from fba.capture.markers.motion import MarkerMotion
+    from fba.capture.markers._motion import MarkerMotion
     from tools.captures.marker_files import c3d, qualisys, trc
 
     def take(markers: int, frames: int) -> MarkerMotion:

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from fba.face._expressions import Definitions
 from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
-from fba.face.feature_points import names, neutral_points, row_of
+from fba.face.feature_points import names, neutral_points
 from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, FaceModel, Material, Part
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 
 UNITS_NEED = ("3.1", "3.2", "3.3", "3.4", "3.5", "3.6", "9.15", "2.2", "8.3", "8.4")
 NAMES = [fap.name for fap in faps()[2:]]
@@ -41,9 +41,9 @@ def face(**changes: Any) -> FaceModel:
         Part(
             "skin", "skin", skin, triangles, colours=colours, material=Material("flesh", (0.7, 0.4, 0.3), 0.5)
         ),
-        ball("left eye", "eye", points[row_of()["3.5"]], Material("iris", texture=picture())),
-        ball("right eye", "eye", points[row_of()["3.6"]], Material("iris", texture=picture())),
-        ball("upper teeth", "teeth", points[row_of()["9.8"]], Material("enamel", roughness=0.2)),
+        ball("left eye", "eye", points[point_rows()["3.5"]], Material("iris", texture=picture())),
+        ball("right eye", "eye", points[point_rows()["3.6"]], Material("iris", texture=picture())),
+        ball("upper teeth", "teeth", points[point_rows()["9.8"]], Material("enamel", roughness=0.2)),
     )
     lid = FaceDefMesh(
         "skin",

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from fba.errors import FormatError, UnsupportedError
-from fba_player.export.recorder import Recorder
+from fba_player.export._recorder import Recorder
 from fba_player.sound.soundtrack import Soundtrack, find_sound_beside
 from sound_clicks import click_time, sound, write_click
 

@@ -19,7 +19,8 @@ from PIL import Image
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.player import Preview
-from fba_player.export import notebook, offscreen
+from fba_player.export import _offscreen as offscreen
+from fba_player.export import notebook
 from player_tracks import face_track
 from sound_clicks import click_time, write_click
 

@@ -13,7 +13,7 @@ import pytest
 import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError
-from fba.face.model import point_row
+from fba.parameters import point_rows
 from fba.player import Camera, Offscreen, Scene
 from fba_player.gl import _context as context
 from player_tracks import body_track, face_track
@@ -77,7 +77,7 @@ class TestPictures:
         where = changed(picture(still(), camera=camera), picture(still(faps), camera=camera))
         rows = []
         for name, above in (between[:2], between[2:]):
-            place = scene.model.points[point_row(name)] + (0, above, 0)
+            place = scene.model.points[point_rows()[name]] + (0, above, 0)
             clip = camera.projection_matrix(4 / 3) @ camera.view_matrix() @ [*place, 1.0]
             rows.append(round(120 * (1 - clip[1] / clip[3])))
         assert where.sum() > 30

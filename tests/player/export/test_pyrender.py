@@ -15,8 +15,8 @@ import pytest
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.player import to_pyrender
-from fba_player.export import pyrender_bridge
-from fba_player.export.pyrender_bridge import _numpy_1_names
+from fba_player.export import _pyrender_bridge as pyrender_bridge
+from fba_player.export._pyrender_bridge import _numpy_1_names
 
 BOTH = """
 import json, sys

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fba.errors import FormatError, UnsupportedError
-from fba_player.export.recorder import MAX_WAITING_PICTURES, Recorder
+from fba_player.export._recorder import MAX_WAITING_PICTURES, Recorder
 
 pytest.importorskip("av")
 
@@ -160,7 +160,7 @@ def test_impossible_paths_and_sizes_are_refused(tmp_path: Path) -> None:
 FORGET = """
 import sys
 import numpy as np
-from fba_player.export.recorder import Recorder
+from fba_player.export._recorder import Recorder
 recorder = Recorder(sys.argv[1], (16, 16))
 recorder.add(np.zeros((16, 16, 4), dtype=np.uint8))
 """
@@ -177,7 +177,7 @@ FILL = """
 import resource, signal, sys
 import numpy as np
 from fba.errors import FbaError
-from fba_player.export.recorder import Recorder
+from fba_player.export._recorder import Recorder
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 noise = np.random.default_rng(1).integers(0, 256, (64, 64, 4), dtype=np.uint8)
 recorder = Recorder(sys.argv[1], (64, 64))

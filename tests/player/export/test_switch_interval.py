@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from fba_player.export.recorder import PROMPT_THREADS, PromptThreads
+from fba_player.export._recorder import PROMPT_THREADS, PromptThreads
 
 
 class Interpreter:

@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from fba.body import BapSolver
-from fba.body.model import BodyModel
+from fba.body import BapSolver, BodyModel
 from fba.compiled import is_compiled
 from fba_player._figure.body_light import UNOBSTRUCTED_LIGHT, build_body_light
 

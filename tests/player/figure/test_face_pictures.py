@@ -11,7 +11,8 @@ import pytest
 from PIL import Image
 
 from fba.animation import Animation
-from fba.face.model import FaceModel, point_row
+from fba.face.model import FaceModel
+from fba.parameters import point_rows
 from fba.player import Camera, Offscreen, Scene
 from player_tracks import face_track
 
@@ -55,7 +56,7 @@ def backdrop(camera: Camera) -> npt.NDArray[np.int64]:
 
 def eye_camera(side: str = "3.5") -> Camera:
     points = FaceModel.default().points
-    x, y, z = points[point_row(side)]
+    x, y, z = points[point_rows()[side]]
     return Camera(target=(x, y, z), distance=0.16)
 
 
@@ -64,7 +65,7 @@ def test_open_jaw_lowers_the_silhouette_of_the_chin() -> None:
     model = FaceModel.default()
     neutral, opened = shown(camera, {}, {3: 600})
     empty = backdrop(camera)
-    chin = model.points[point_row("2.1")]
+    chin = model.points[point_rows()["2.1"]]
     sunk = 600 * model.fapu.MNS
     before_neck = slice(0, round(pixel(camera, chin - [0, 0, 0.02])[0]))  # the face looks to the left
     lowest = []
@@ -115,7 +116,7 @@ def test_the_texture_is_on_the_skin() -> None:
     other = replace(model, parts=(green, *model.parts[1:]))
     camera = scene().camera("front", SIZE[0] / SIZE[1])
     as_it_is, painted = shown(camera, {})[0], shown(camera, {}, model=other)[0]
-    x, y = (round(v) for v in pixel(camera, model.points[point_row("5.3")]))
+    x, y = (round(v) for v in pixel(camera, model.points[point_rows()["5.3"]]))
     assert as_it_is[y, x, 0] > as_it_is[y, x, 1]
     assert painted[y, x, 1] > painted[y, x, 0] + 40
 

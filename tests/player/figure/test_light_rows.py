@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fba.body import BapSolver
-from fba.body.model import BodyModel
+from fba.body import BapSolver, BodyModel
 from fba.compiled import is_compiled
 from fba.face.model import FaceModel
 from fba_player._figure.face import build_figure

@@ -13,7 +13,8 @@ from fba.animation import Animation
 from fba.errors import FbaWarning
 from fba.face.deform._deformer import Deformer
 from fba.face.feature_points import names
-from fba.face.model import FaceModel, Part, point_row
+from fba.face.model import FaceModel, Part
+from fba.parameters import point_rows
 from fba.player import Offscreen, Scene
 from fba_player._figure.model_units import prepare_model, resize
 from fba_player.scene.scene import SWITCHES
@@ -109,4 +110,4 @@ def test_sizes_change_nothing_that_faps_do(factor: float) -> None:
     expected = Deformer(model)(vector)
     np.testing.assert_allclose(Deformer(grown)(vector) / factor, expected, atol=2e-6)
     np.testing.assert_allclose(Deformer(other)(vector), expected, atol=2e-6)
-    np.testing.assert_allclose(grown.points[point_row("2.1")], model.points[point_row("2.1")] * factor)
+    np.testing.assert_allclose(grown.points[point_rows()["2.1"]], model.points[point_rows()["2.1"]] * factor)

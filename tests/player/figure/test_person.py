@@ -10,8 +10,7 @@ import pytest
 
 import fba
 from fba import Animation
-from fba.body import BapSolver
-from fba.body.model import BodyModel
+from fba.body import BapSolver, BodyModel
 from fba.face.model import FaceModel
 from fba.player import Scene
 from fba_player._figure.face import build_figure

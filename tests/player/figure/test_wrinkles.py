@@ -13,7 +13,8 @@ import pytest
 from fba.animation import Animation
 from fba.arrays import Float32
 from fba.errors import ModelError
-from fba.face.model import FaceModel, point_row
+from fba.face.model import FaceModel
+from fba.parameters import point_rows
 from fba.player import Offscreen, Scene
 from fba_player._figure.face import build_figure
 from fba_player._figure.wrinkles import MAP_POINTS, MIRRORED, place_wrinkles, wrinkle_strengths
@@ -97,7 +98,7 @@ class TestPlaces:
         checked = 0
         for name, (x, y) in MAP_POINTS.items():
             for side, point in ((1, name), (-1, MIRRORED.get(name, name))):
-                vertex = int(wide.bound[point_row(point)])
+                vertex = int(wide.bound[point_rows()[point]])
                 if rows.start <= vertex < rows.stop and (side > 0 or point != name):
                     np.testing.assert_allclose(places[vertex - rows.start], (side * x, y), atol=0.03)
                     checked += 1
@@ -108,7 +109,7 @@ class TestPlaces:
         skin = model.part("skin")
         places = place_wrinkles(model, skin)
         assert places is not None
-        behind = skin.vertices[:, 2] < model.points[point_row("10.7"), 2]
+        behind = skin.vertices[:, 2] < model.points[point_rows()["10.7"], 2]
         assert behind.any()
         assert (np.abs(places[behind, 0]) > WIDTH).all()
 
@@ -117,7 +118,7 @@ class TestPlaces:
         assert place_wrinkles(replace(model, wrinkles=False), model.part("skin")) is None
         assert place_wrinkles(model, model.part("teeth_upper")) is None
         points, bound = model.points.copy(), model.bound.copy()
-        points[point_row("4.1")], bound[point_row("4.1")] = np.nan, -1
+        points[point_rows()["4.1"]], bound[point_rows()["4.1"]] = np.nan, -1
         assert place_wrinkles(replace(model, points=points, bound=bound), model.part("skin")) is None
 
 

@@ -28,9 +28,9 @@ from fba.codec import (
     write_opening,
 )
 from fba.errors import FbaError
+from fba_player.playback._timeline import Timeline
+from fba_player.playback._transport import BUFFER_SECONDS, Transport
 from fba_player.playback.live import LiveAnimation, LiveTimeline
-from fba_player.playback.timeline import Timeline
-from fba_player.playback.transport import BUFFER_SECONDS, Transport
 from fba_player.scene.scene import Scene
 from player_tracks import body_track, face_track
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation, BodyTrack, FaceTrack
-from fba_player.playback.timeline import BLOCK_FRAMES, Timeline
+from fba_player.playback._timeline import BLOCK_FRAMES, Timeline
 from player_tracks import body_track, face_track
 
 
@@ -75,8 +75,7 @@ def test_between_frames_a_joint_turns_about_one_axis_nearly(turns: tuple[int, in
     """Half way between two postures, against the half of the rotation that leads from one to the other."""
     from scipy.spatial.transform import Rotation
 
-    from fba.body import BapSolver
-    from fba.body.skeleton import Skeleton
+    from fba.body import BapSolver, Skeleton
 
     skeleton = Skeleton.default()
     joint = skeleton.names.index("l_shoulder")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba_player.playback.timeline import Timeline, clock_text, timecode
-from fba_player.playback.transport import Transport
+from fba_player.playback._timeline import Timeline, clock_text, timecode
+from fba_player.playback._transport import Transport
 from player_tracks import face_track
 from set_clock import Clock
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba_player.export.offscreen import Offscreen
-from fba_player.playback.timeline import Timeline
-from fba_player.playback.transport import Transport
+from fba_player.export._offscreen import Offscreen
+from fba_player.playback._timeline import Timeline
+from fba_player.playback._transport import Transport
 from fba_player.scene._compare_timeline import CompareTimeline
 from fba_player.scene._differences import differences
 from fba_player.scene.compare import CompareScene

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba.body import BapSolver
-from fba.body.footing import GroundedPoser
-from fba.body.model import BodyModel
+from fba.body import BapSolver, BodyModel, GroundedPoser
 from fba.face import feature_point_names, resolve
 from fba.face.deform._deformer import Deformer
 from fba.face.model import FaceModel

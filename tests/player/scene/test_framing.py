@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from fba_player.scene._framing import body_extent
-from fba_player.view.camera import Camera
+from fba_player.view._camera import Camera
 
 NAMES = ("HumanoidRoot", "l_knee", "r_knee", "l_ankle", "r_ankle", "skullbase", "l_wrist")
 STANDING = np.array([

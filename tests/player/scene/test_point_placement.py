@@ -14,8 +14,8 @@ from fba.face.importers.head_surface import HeadSurface, read_head_surface
 from fba.face.importers.points.points_file import read_points
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement, describe_point
+from fba_player.view._camera import Camera
 from fba_player.view._geometry import first_hit, ray_through
-from fba_player.view.camera import Camera
 
 NONE = np.full((84, 3), np.nan)
 CUBE = """v -1 -1 1
@@ -184,21 +184,22 @@ def test_what_cannot_be_saved_leaves_the_old_file(placement: PointPlacement, tmp
 
 
 def test_a_guess_is_the_nearest_vertex_to_where_an_adult_has_the_point(tmp_path: Path) -> None:
-    from fba.face.feature_points import neutral_points, row_of
+    from fba.face.feature_points import neutral_points
+    from fba.parameters import point_rows
 
     adult = neutral_points() * 100 + (3, 2, 1)
     (tmp_path / "dots.obj").write_text(
         "".join(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in adult)
         + "".join(f"f {n} {n % 84 + 1} {(n + 1) % 84 + 1}\n" for n in range(1, 85))
     )
-    given = {name: row_of()[name] for name in ("3.5", "3.6", "9.15")}
+    given = {name: point_rows()[name] for name in ("3.5", "3.6", "9.15")}
     placement = PointPlacement(read_head_surface(tmp_path / "dots.obj", points=given), "x.csv")
     placement.choose("2.1")
     assert placement.guess() is None  # of three points
-    placement.places["8.3"] = row_of()["8.3"]
+    placement.places["8.3"] = point_rows()["8.3"]
     guess = placement.guess()
     assert guess is not None
-    np.testing.assert_allclose(guess, adult[row_of()["2.1"]], rtol=1e-5)
+    np.testing.assert_allclose(guess, adult[point_rows()["2.1"]], rtol=1e-5)
 
 
 def test_a_ray_meets_the_nearest_triangle_from_either_side() -> None:

@@ -10,7 +10,8 @@ import pytest
 
 from fba.animation import Animation
 from fba.errors import FbaWarning
-from fba.face.model import FaceModel, point_row
+from fba.face.model import FaceModel
+from fba.parameters import point_rows
 from fba.player import Scene, default_camera
 from fba_player._figure._face_parts import compute_sway
 from fba_player._figure.face import FaceFigure, build_figure
@@ -32,7 +33,7 @@ def figure() -> FaceFigure:
 
 
 def test_the_skin_follows_the_model(figure: FaceFigure) -> None:
-    chin = figure.model.bound[point_row("2.1")]
+    chin = figure.model.bound[point_rows()["2.1"]]
     skin = figure.model.parts[0]
     assert skin.kind == "skin"
     assert chin < len(skin.vertices)
@@ -66,14 +67,14 @@ def test_eyes_have_the_size_of_the_face(figure: FaceFigure) -> None:
     assert wide[1].pupil == right.pupil
     thrust = figure.eyes(faps(f27=100), np.eye(4))[0].matrix[:3, 3] - centre
     np.testing.assert_allclose(thrust, [0, 0, 100 * unit.ES], atol=1e-5)
-    edge = figure.model.points[point_row("3.5")][2]
+    edge = figure.model.points[point_rows()["3.5"]][2]
     assert edge == pytest.approx(centre[2] + radius, abs=0.002)
 
 
 def test_the_neck_bends_and_the_shoulders_stay(figure: FaceFigure) -> None:
     skin = figure.model.vertices[: len(figure.model.parts[0].vertices)]
     share = compute_sway(figure.model)[: len(skin)]
-    chin = figure.model.points[point_row("2.10")]
+    chin = figure.model.points[point_rows()["2.10"]]
     assert (share[(skin[:, 1] > chin[1] + 0.01) & (skin[:, 2] > chin[2] - 0.03)] > 0.8).all()
     assert (share[skin[:, 1] > figure.between_eyes[1]] == 1).all()
     assert share[skin[:, 1].argmin()] == 0
@@ -84,7 +85,7 @@ def test_a_face_without_feature_points_of_the_neck_turns_whole() -> None:
     model = FaceModel.default()
     points, bound = model.points.copy(), model.bound.copy()
     for name in ("2.1", "2.10"):
-        points[point_row(name)], bound[point_row(name)] = np.nan, -1
+        points[point_rows()[name]], bound[point_rows()[name]] = np.nan, -1
     assert (compute_sway(replace(model, points=points, bound=bound)) == 1).all()
 
 
@@ -116,7 +117,7 @@ def test_light_falls_into_an_open_mouth(figure: FaceFigure) -> None:
     drawn = [part for part in figure.model.parts if part.kind != "eye"]
     places = []
     for name in ("9.10", "9.11", "6.1"):  # edges of the teeth, tip of the tongue
-        vertex = int(figure.model.bound[point_row(name)])
+        vertex = int(figure.model.bound[point_rows()[name]])
         starts = figure.model.starts
         part = max((p for p in drawn if starts[p.name] <= vertex), key=lambda p: starts[p.name])
         places.append((part, vertex - starts[part.name]))

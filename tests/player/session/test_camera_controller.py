@@ -8,7 +8,7 @@ import pytest
 from fba.animation import Animation
 from fba_player.scene.scene import Scene
 from fba_player.session._camera_controller import GLIDE_SECONDS, Viewpoint
-from fba_player.view.camera import PRESETS, Camera
+from fba_player.view._camera import PRESETS, Camera
 from set_clock import Clock
 
 

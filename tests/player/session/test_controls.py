@@ -13,7 +13,7 @@ from fba_player.session._camera_controller import GLIDE_SECONDS
 from fba_player.session._controls import Controls
 from fba_player.session._keys import by_name
 from fba_player.session._session import Session
-from fba_player.view.camera import Camera, Subject
+from fba_player.view._camera import Camera, Subject
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ import pytest
 import fba
 from fba.errors import FormatError
 from fba.face import resolve
-from fba_player.session.puppet import Expression, Puppet, Viseme
-from fba_player.session.takes import TakeRecorder, Takes, take_rate
+from fba_player.session._puppet import Expression, Puppet, Viseme
+from fba_player.session._takes import TakeRecorder, Takes, take_rate
 
 
 def played() -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba_player.playback.transport import Transport
+from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._captures import Captures
 from fba_player.session._session import Session

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from fba_player.sound.player import SoundClock
+from fba_player.sound._player import SoundClock
 
 RATE, PERIOD, LATENCY = 48_000, 0.04, 0.08
 COUNT = 1920  # samples of a period

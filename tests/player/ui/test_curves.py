@@ -20,7 +20,7 @@ from fba_player._ui.panels._curve_data import (
     envelope,
 )
 from fba_player._ui.panels._curves_panel import search_parameters
-from fba_player.playback.timeline import Timeline
+from fba_player.playback._timeline import Timeline
 from player_tracks import body_track, face_track
 
 

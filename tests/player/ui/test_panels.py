@@ -11,7 +11,7 @@ import pytest
 import fba
 import graphics
 from fba.animation import Animation
-from fba_player.playback.transport import Transport
+from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
 from fba_player.session._source import Source
@@ -198,7 +198,7 @@ def test_bare_shows_the_picture_alone(studio: Studio) -> None:
     session = studio.session
     session.open |= {"file", "view"}
     session.bare = True
-    from fba_player.export.offscreen import Offscreen
+    from fba_player.export._offscreen import Offscreen
 
     with Offscreen(session.scene, SIZE, session.viewpoint.camera) as plain:
         wanted = plain.frame(0.0)

@@ -13,11 +13,11 @@ from fba.animation import Animation
 from fba.emotion import combine, expression, known_points, modify
 from fba.errors import OptionError
 from fba.tracks import FaceTrack
-from fba_player.playback.transport import Transport
+from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._mood import COMMON, PuppetMood
+from fba_player.session._puppet import Puppet
 from fba_player.session._session import Session
-from fba_player.session.puppet import Puppet
 from set_clock import Clock
 from studio_hand import StudioHand, panel_of
 

@@ -12,7 +12,7 @@ import pytest
 import fba
 import graphics
 from fba.animation import Animation
-from fba_player.playback.transport import Transport
+from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
 from fba_player.session._source import Source

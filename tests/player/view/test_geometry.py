@@ -15,9 +15,9 @@ from fba_player._figure.face import find_eyeball
 from fba_player._mesh.primitives import sphere_mesh
 from fba_player.gl._antialias_region import bounding_rectangles
 from fba_player.gl._silhouette import TILE, Outliner
+from fba_player.view._camera import Camera
 from fba_player.view._geometry import rotation_vector, turn_partly
 from fba_player.view._view import FaceMesh, FaceShape, Mesh, MeshShape, View
-from fba_player.view.camera import Camera
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.5, 2.0, 3.1, np.pi])

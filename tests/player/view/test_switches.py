@@ -11,9 +11,10 @@ import numpy.typing as npt
 import pytest
 
 from fba.animation import Animation
-from fba.body.model import BodyModel
+from fba.body import BodyModel
 from fba.face.deform._deformer import Deformer
-from fba.face.model import FaceModel, point_row
+from fba.face.model import FaceModel
+from fba.parameters import point_rows
 from fba.player import Camera, Offscreen, Scene
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player.gl._labels import place_names
@@ -220,11 +221,11 @@ class TestInfluence:
     def test_feature_points_move_by_their_faps_units(self, figure: FaceFigure) -> None:
         model = figure.model
         for number, unit, point in ((31, "ENS", "4.1"), (5, "MNS", "2.3"), (63, "ENS", "9.3")):
-            vertex = model.bound[point_row(point)]
+            vertex = model.bound[point_rows()[point]]
             moved = FapHeatmap(figure, number).distances[vertex]
             assert moved == pytest.approx(100 * model.fapu[unit], rel=0.002), number
         jaw = FapHeatmap(figure, 3)
-        assert jaw.distances[model.bound[point_row("2.1")]] > 100 * model.fapu.MNS  # on an arc
+        assert jaw.distances[model.bound[point_rows()["2.1"]]] > 100 * model.fapu.MNS  # on an arc
         assert (jaw.distances[model.vertices[:, 1] > 0] == 0).all()
         assert jaw.legend.title == "FAP 3 open_jaw"
         assert jaw.legend.most == pytest.approx(jaw.distances.max() * 1000)
@@ -232,7 +233,7 @@ class TestInfluence:
     def test_a_turned_head_moves_most_where_it_is_furthest_from_its_axis(self, figure: FaceFigure) -> None:
         yaw, model = FapHeatmap(figure, 49), figure.model
         centre = model.table_of[49].transforms[0].centre
-        nose = int(model.bound[point_row("9.3")])
+        nose = int(model.bound[point_rows()["9.3"]])
         arm = np.hypot(*(model.vertices[nose, [0, 2]] - np.array(centre)[[0, 2]]))
         assert yaw.distances[nose] == pytest.approx(2 * np.sin(0.05) * arm, rel=1e-4)
         assert yaw.distances[model.vertices[:, 1].argmin()] == pytest.approx(
@@ -366,7 +367,7 @@ class TestPictures:
         plain, dotted = pictures(face(), {}, {"points": True}, camera=camera, size=(640, 480))
         matrix = camera.projection_matrix(4 / 3) @ camera.view_matrix()
         for name in ("9.3", "2.10", "11.1", "5.3", "4.3", "3.5"):
-            clip = matrix @ [*scene.model.points[point_row(name)], 1.0]
+            clip = matrix @ [*scene.model.points[point_rows()[name]], 1.0]
             x, y = round(320 * (1 + clip[0] / clip[3])), round(240 * (1 - clip[1] / clip[3]))
             assert dotted[y, x, 0] > 220, name
             assert dotted[y, x, 2] < 110, name

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from fba_player.window.display import FullScreen, overlap
+from fba_player.window._display import FullScreen, overlap
 
 
 class Glfw:

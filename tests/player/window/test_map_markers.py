@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import graphics
+from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import target_points
-from fba.capture.markers.motion import MarkerMotion
 from fba.capture.virtual_markers import MarkedHead, MarkerMapping, propose_mapping, read_head, read_mapping
 from fba.errors import DisplayError, OptionError
 from fba_player.scene.marker_editing import MarkerEditing
@@ -125,9 +125,9 @@ def test_clicks_choose_a_marker_and_put_it_on_the_head(studio: Studio, editing: 
 
 
 def small_row(name: str) -> int:
-    from fba.face.feature_points import row_of
+    from fba.parameters import point_rows
 
-    return row_of()[name]
+    return point_rows()[name]
 
 
 def test_the_head_moves_as_the_marker_and_shows_its_reach(studio: Studio, editing: MarkerEditing) -> None:

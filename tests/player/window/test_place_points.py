@@ -11,9 +11,9 @@ import pytest
 
 import graphics
 from fba.errors import DisplayError
-from fba.face.feature_points import row_of
 from fba.face.importers.head_surface import HeadSurface, read_head_surface
 from fba.face.importers.points.points_file import read_points
+from fba.parameters import point_rows
 from fba_player.scene._placement_scene import CURRENT, PlacementScene
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.session._session import Session
@@ -56,7 +56,7 @@ def pixel_of(session: Session, name: str) -> tuple[float, float]:
     scene, camera = session.scene, session.camera(0.0)
     assert isinstance(scene, PlacementScene)
     head = small_head()
-    world = np.append(scene.to_world(head.points[row_of()[name]][None].astype(float))[0], 1.0)
+    world = np.append(scene.to_world(head.points[point_rows()[name]][None].astype(float))[0], 1.0)
     clip = camera.projection_matrix(SIZE[0] / SIZE[1]) @ camera.view_matrix() @ world
     seen = clip[:2] / clip[3]
     return float((seen[0] + 1) * SIZE[0] / 2), float((1 - seen[1]) * SIZE[1] / 2)
@@ -76,7 +76,7 @@ def test_a_click_places_a_point_and_a_drag_turns_the_head(studio: Studio) -> Non
     at = pixel_of(session, "9.3")
     camera = session.viewpoint.camera
     drag(studio, at, (at[0] + 2, at[1]))
-    assert placement.places["9.3"] == small_head().bound[row_of()["9.3"]]
+    assert placement.places["9.3"] == small_head().bound[point_rows()["9.3"]]
     assert session.viewpoint.camera == camera
     assert session.unsaved == {"the points"}
     before = dict(placement.places)
@@ -100,7 +100,7 @@ def test_the_current_point_is_drawn_and_the_player_s_bar_is_not(studio: Studio) 
     placement.choose("9.3")
     placement.places.pop("9.3", None)
     assert blue_near_nose() < 5
-    placement.place(int(small_head().bound[row_of()["9.3"]]))
+    placement.place(int(small_head().bound[point_rows()["9.3"]]))
     assert blue_near_nose() > 20
     assert studio.draw(2)[440:, :300, :3].mean() > 90  # the background, where the bar would be dark
 
@@ -135,20 +135,20 @@ def test_keys_work_through_the_points(on_display: str, surface: HeadSurface, tmp
         placement.choose("8.3")
         window.controls.press("left", *pixel_of(window.session, "8.3"))
         window.controls.release()
-        assert placement.places["8.3"] == head[row_of()["8.3"]]
+        assert placement.places["8.3"] == head[point_rows()["8.3"]]
         press(glfw.KEY_M)
-        assert placement.places["8.4"] == head[row_of()["8.4"]]
+        assert placement.places["8.4"] == head[point_rows()["8.4"]]
         press(glfw.KEY_Z, glfw.MOD_CONTROL)
         assert "8.4" not in placement.places
         press(glfw.KEY_M, glfw.MOD_CONTROL)
-        assert placement.places["8.4"] == head[row_of()["8.4"]]
+        assert placement.places["8.4"] == head[point_rows()["8.4"]]
         press(glfw.KEY_P)  # of the player, which has no meaning here
         press(glfw.KEY_F2)
         assert window.session.open == {"points"}
         press(glfw.KEY_Q)
         assert not window.session.closing  # not saved
         press(glfw.KEY_S, glfw.MOD_CONTROL)
-        assert read_points(placement.path).vertices["8.4"] == head[row_of()["8.4"]]
+        assert read_points(placement.path).vertices["8.4"] == head[point_rows()["8.4"]]
         press(glfw.KEY_DELETE)
         assert "8.3" not in placement.places
         press(glfw.KEY_Z, glfw.MOD_CONTROL)

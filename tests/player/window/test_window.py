@@ -14,10 +14,10 @@ import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
 from fba_player.gl._context import import_moderngl
-from fba_player.gl.renderer import Renderer
+from fba_player.gl._renderer import Renderer
 from fba_player.scene.scene import Scene
+from fba_player.window._play import play
 from fba_player.window._window import Window
-from fba_player.window.play import play
 from open_windows import opened, settle, shown, until
 
 glfw = graphics.imported("glfw")

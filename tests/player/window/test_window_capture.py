@@ -13,7 +13,7 @@ from fba.tracks import BodyTrack, FaceTrack
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
-from fba_player.window.play import follow_newest
+from fba_player.window._play import follow_newest
 from player_tracks import face_track
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Float64
-from fba.face.feature_points import row_of
+from fba.parameters import point_rows
 from fba.persona.points._adaptation import head_matrices
 from fba.persona.points.layout import TRACKED, points_of_face
 
@@ -27,7 +27,7 @@ def photograph(
 
     features: (T, 84, 3), metres. angles: (T, 3), pitch, yaw and roll of the head. noise: pixels.
     """
-    centre = features[:, row_of()["7.1"]][:, None]
+    centre = features[:, point_rows()["7.1"]][:, None]
     turned = (features - centre) @ np.swapaxes(head_matrices(angles), 1, 2)
     points = points_of_face(turned)[:, :TRACKED] / 1000.0 * TO_CAMERA
     picture = PIXELS * FAR * points[..., :2] / (FAR + points[..., 2:])

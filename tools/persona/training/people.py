@@ -17,8 +17,8 @@ from fba.arrays import Float64, Intp
 from fba.capture.markers._solving import JAW, JAW_VALUES, measure_responses
 from fba.errors import ModelError
 from fba.face import FaceModel, Fapu, FeaturePointFace, neutral_points
-from fba.face.feature_points import MIRRORED, row_of
-from fba.parameters import FAP_COUNT, faps
+from fba.face.feature_points import MIRRORED
+from fba.parameters import FAP_COUNT, faps, point_rows
 
 DEVIATIONS = {
     "size": 0.04, "width": 0.045, "eyes": 0.055, "nose": 0.065, "lip": 0.11, "chin": 0.08, "mouth": 0.068,
@@ -106,7 +106,7 @@ def _vary(base: Float64, random: np.random.Generator) -> Float64:
 
 def _vary_once(base: Float64, random: np.random.Generator) -> Float64:
     by = {name: _draw(random, deviation) for name, deviation in DEVIATIONS.items()}
-    rows, points = row_of(), base.copy()
+    rows, points = point_rows(), base.copy()
     nose, mouth, chin = (float(base[rows[name], 1]) for name in ("9.15", "2.2", "2.1"))
     heights = np.array([chin - 0.02, chin, mouth, nose, 0.0, 0.2])
     steps = np.array([1.0, by["chin"], by["lip"], by["nose"], by["width"]]) * np.diff(heights)
@@ -141,7 +141,7 @@ def _smooth_errors(base: Float64, random: np.random.Generator) -> Float64:
     errors = SMOOTH * np.clip(root @ random.normal(size=(len(base), 3)), -MOST, MOST)
     other = np.arange(len(base))
     for left, right in MIRRORED.items():
-        other[row_of()[left]], other[row_of()[right]] = row_of()[right], row_of()[left]
+        other[point_rows()[left]], other[point_rows()[right]] = point_rows()[right], point_rows()[left]
     mirrored = errors[other] * (-1.0, 1.0, 1.0)
     even, odd = (errors + mirrored) / 2, (errors - mirrored) / 2
     return np.asarray(even + ONE_SIDED * odd)

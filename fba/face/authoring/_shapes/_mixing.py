@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
-from fba.easing import smoothstep
 from fba.face._tables import FaceDefTables
 from fba.face.authoring._shapes._shapes import Shapes
 from fba.face.authoring.surface._fold_limits import Limiter
@@ -16,10 +15,10 @@ from fba.face.authoring.surface._motion import Motion, build_tables, ease_field,
 from fba.face.authoring.surface._motion_limits import EASE, MODERATE_VALUE, coupled_motions, linear_motion
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import Surface
-from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.points import DIRECTIONS
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
+from fba.sampling import smoothstep
 
 MOVING_WEIGHT = 3.0
 """Weight of the points that are to move, along the motion."""
@@ -60,14 +59,14 @@ class Mixer:
         points: dict[str, int] = {}
         for fap in (fap for region in REGIONS for fap in region):
             names = faps()[fap - 1].feature_points
-            if len(names) == 1 and fap in self.base.table_of and self.base.bound[row_of()[names[0]]] >= 0:
+            if len(names) == 1 and fap in self.base.table_of and self.base.bound[point_rows()[names[0]]] >= 0:
                 points.setdefault(names[0], fap)
         return points
 
     @cached_property
     def vertices(self) -> Intp:
         """(P,) vertices of the points."""
-        return np.array([self.base.bound[row_of()[name]] for name in self.points], dtype=np.intp)
+        return np.array([self.base.bound[point_rows()[name]] for name in self.points], dtype=np.intp)
 
     @cached_property
     def weights(self) -> Float64:
@@ -214,7 +213,7 @@ class Mixer:
         """Return the tables of a FAP for which the mesh alone gives none, linear along shapes, or None."""
         entry = faps()[fap - 1]
         name = entry.feature_points[0]
-        vertex = int(self.base.bound[row_of()[name]])
+        vertex = int(self.base.bound[point_rows()[name]])
         if vertex < 0 or entry.positive not in DIRECTIONS:
             return None
         field = np.sum([self.shapes.displacements(shape) for shape in shapes], axis=0)

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Floating
-from fba.easing import smoothstep
 from fba.errors import ModelError
 from fba.face.authoring.surface.landmarks import weld_skin
 from fba.face.authoring.surface.surface import Surface
 from fba.face.model import FaceModel, Part
+from fba.sampling import smoothstep
 
 BLEND = 0.12
 """Half the width over which a shape fades from one side to the other, as a share of ES0."""

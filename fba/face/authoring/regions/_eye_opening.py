@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
-from fba.easing import smoothstep
 from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.surface import Surface, positions_in
 from fba.face.eyeball import polar
 from fba.face.model import Part
+from fba.sampling import smoothstep
 
 LIDS = {19: ("left", "upper"), 20: ("right", "upper"), 21: ("left", "lower"), 22: ("right", "lower")}
 CLOSED = 1024

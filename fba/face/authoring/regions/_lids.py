@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.easing import smoothstep
 from fba.face.authoring.regions._eye_opening import (
     CLOSED,
     LIDS,
@@ -34,6 +33,7 @@ from fba.face.authoring.surface.attached_parts import hair_roots
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.model import Part
+from fba.sampling import smoothstep
 
 STEP = 128
 """FAP units between two borders of the tables: an eighth of the motion from open to closed."""

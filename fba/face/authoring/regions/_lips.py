@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.easing import smoothstep
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion, ease_field
 from fba.face.authoring.surface._motion_limits import coupled_motions, eased_linear_motion, values_to_reach
 from fba.face.authoring.surface._weights import reachable_region, solve_smooth_field, trim_small
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.parameters import faps
+from fba.sampling import smoothstep
 
 HANDLES = {
     "left corner": ("2.4", "8.3"),

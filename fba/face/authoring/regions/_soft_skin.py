@@ -14,7 +14,6 @@ from itertools import pairwise
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
-from fba.easing import smoothstep
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion
 from fba.face.authoring.surface._motion_limits import eased_linear_motion
@@ -29,6 +28,7 @@ from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.feature_points import MATES
 from fba.face.points import DIRECTIONS
 from fba.parameters import faps
+from fba.sampling import smoothstep
 from fba.text_files import packaged_rows
 
 SMOOTHING_ROUNDS = 5

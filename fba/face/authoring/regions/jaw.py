@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
-from fba.easing import smoothstep
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion, fap_limits
 from fba.face.authoring.surface._motion_limits import human_range, linear_motion, stop_at_folds
@@ -19,45 +18,43 @@ from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.model import Part
 from fba.face.points import OPEN_JAW, TONGUE_ROLL
+from fba.sampling import smoothstep
 
 CHIN = ("2.1", "2.10", "2.11", "2.12")
 EARS = ("10.7", "10.8", "10.9", "10.10")
 """Where the ears meet the face; the hinge lies between them."""
 UNMOVED_POINTS = (*EARS, "3.9", "3.10", "5.3", "5.4", "8.1", "9.1", "9.2", "9.3", "9.15", "10.5", "10.6")
 """Feature points that the jaw does not move."""
-REACH = 1.5
-"""Reach of the jaw's motion into cheeks and neck, in ES0."""
-NECK_DISTANCE = 0.1
-"""Open edges of the skin further below the chin than this, in ES0, are where the neck was cut."""
-CORNER_SHARE = 0.6
-"""Share of the jaw's rotation that the skin over its corners makes."""
-MAX_OPENING = np.radians(30.0)
-"""Radians by which the jaw opens at most."""
-HINGE_SLIDE = (0.35, 0.1)
-"""Motion of the hinge forwards and down per radian, in ES0: some 11 mm when wide open."""
-MAX_INTERVAL = np.radians(3.0)
-"""Longest interval into which the arc is cut, radians."""
-LIP_RIDE = 0.5
-"""Share of a sliding jaw's motion that the lower lip makes. An opening jaw does not move the lip, which has
-FAPs of its own."""
-SLACK = 0.2
-"""Distance in ES0 beyond which the skin does not overshoot."""
-MIN_SHARE = 0.004
-"""Shares of a motion below this are set to 0."""
-TEETH_MARGIN = 0.12
-"""Height about the teeth's edge over which the jaw's share goes from 0 to 1, in MNS0."""
-CHEEK_MARGIN = 0.4
-"""Height above and below the teeth's edge over which the inside of the mouth may stretch, in MNS0."""
-ONE_JAW_MARGIN = 0.15
-"""Teeth of which half plus this share lies on one side of their common edge belong to one jaw."""
-LIP_DEPTH = 0.16
-"""Distance from the lips beyond which the inside of the mouth moves as the jaws do, in ES0."""
 TONGUE_FAPS = (43, 44, 45, 46, 47)
 TONGUE_POINTS = {43: ("6.1",), 44: ("6.1",), 45: ("6.1",), 46: ("6.2",), 47: ("6.2", "6.3", "6.4")}
-TIP_BEND = 2.0
-"""Power of the length with which the tip's motion falls off to the root, so that the tongue bends."""
-ROLL_STEPS = 8
-"""Number of values at which the roll is computed."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the jaw."""
+
+    reach: float = 1.5  # reach of the jaw's motion into cheeks and neck, in ES0
+    neck_distance: float = 0.1  # ES0 below the chin, beyond which open edges are where the neck was cut
+    corner_share: float = 0.6  # share of the jaw's rotation that the skin over its corners makes
+    max_opening: float = np.radians(30.0)  # radians by which the jaw opens at most
+    # motion of the hinge forwards and down per radian, in ES0: some 11 mm when wide open
+    hinge_slide: tuple[float, float] = (0.35, 0.1)
+    max_interval: float = np.radians(3.0)  # longest interval into which the arc is cut, radians
+    # share of a sliding jaw's motion that the lower lip makes. An opening jaw does not move the lip, which
+    # has FAPs of its own.
+    lip_ride: float = 0.5
+    slack: float = 0.2  # distance in ES0 beyond which the skin does not overshoot
+    min_share: float = 0.004  # shares of a motion below this are set to 0
+    teeth_margin: float = 0.12  # height about the teeth's edge where the jaw's share goes from 0 to 1, MNS0
+    # height above and below the teeth's edge over which the inside of the mouth may stretch, in MNS0
+    cheek_margin: float = 0.4
+    one_jaw_margin: float = 0.15  # teeth with half plus this share on one side of their edge are one jaw's
+    lip_depth: float = 0.16  # distance from the lips beyond which the mouth moves as the jaws do, in ES0
+    tip_bend: float = 2.0  # power of the length with which the motion falls off to the root: it bends
+    roll_steps: int = 8  # number of values at which the roll is computed
+
+
+TUNING = Tuning()
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +89,12 @@ def find_jaw(marks: Landmarks) -> Jaw | str:
 def opening_angles(jaw: Jaw, unit: float) -> tuple[Float64, Float64]:
     """Return (values, angles): rising values of FAP 3 and the angles at which the chin has sunk that far."""
     low, high = fap_limits(OPEN_JAW)
-    fine = np.linspace(0, MAX_OPENING, 400)
+    fine = np.linspace(0, TUNING.max_opening, 400)
     sunk = -opening_shifts(jaw.chin[None], jaw, fine)[:, 0, 1]
     fine = fine[: int(sunk.argmax()) + 1]
     sunk = np.maximum.accumulate(sunk[: len(fine)])
     deepest = min(float(sunk[-1]) / unit, high)
-    count = max(5, int(np.ceil(fine[-1] / MAX_INTERVAL)))
+    count = max(5, int(np.ceil(fine[-1] / TUNING.max_interval)))
     values = np.unique(np.round(np.linspace(0, deepest, count + 1)))
     angles = np.interp(values * unit, sunk, fine)
     if values[-1] < high:
@@ -115,7 +112,7 @@ def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
     y, z = points[:, 1] - jaw.hinge[0], points[:, 2] - jaw.hinge[1]
     cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
     zero = np.zeros((len(angles), len(points)))
-    forward, down = (step * jaw.size * angles[:, None] for step in HINGE_SLIDE)
+    forward, down = (step * jaw.size * angles[:, None] for step in TUNING.hinge_slide)
     return np.stack([zero, y * cos - z * sin - y - down, y * sin + z * cos - z + forward], axis=-1)
 
 
@@ -144,18 +141,18 @@ def jaw_share_of_part(marks: Landmarks, part: Part, hinge: Float64) -> Float64:
     if part.kind == "tongue":
         return np.ones(len(part.vertices))
     shape = weld_parts([part])
-    margin = TEETH_MARGIN * marks.fapu.MNS * 1024
+    margin = TUNING.teeth_margin * marks.fapu.MNS * 1024
     each = smoothstep(below_bite(marks, shape.vertices, hinge) / (2 * margin) + 0.5)
     if part.kind == "teeth":
         row = _by_teeth_points(marks, part)
         if row is not None:
             return np.full(len(part.vertices), row)
         # decided for the whole row first, then for each piece: an overbite must not move upper teeth
-        if abs(float(each.mean()) - 0.5) > ONE_JAW_MARGIN:
+        if abs(float(each.mean()) - 0.5) > TUNING.one_jaw_margin:
             return np.full(len(part.vertices), float(each.mean() > 0.5))
         count = np.bincount(shape.component)
         mean = np.bincount(shape.component, each) / count
-        in_one_jaw = np.abs(mean - 0.5) > ONE_JAW_MARGIN
+        in_one_jaw = np.abs(mean - 0.5) > TUNING.one_jaw_margin
         each = np.where(in_one_jaw[shape.component], (mean > 0.5)[shape.component], each)
     return each[shape.number]
 
@@ -189,29 +186,29 @@ def _share(marks: Landmarks, hinge: Float64) -> Float64:
     values: dict[int, float] = {}
     if len(line):
         values |= dict(zip(line.tolist(), _along_jaw(marks, line).tolist(), strict=True))
-    values |= dict.fromkeys(marks.vertices_of(("2.13", "2.14")).tolist(), CORNER_SHARE)
+    values |= dict.fromkeys(marks.vertices_of(("2.13", "2.14")).tolist(), TUNING.corner_share)
     values |= dict.fromkeys(marks.vertices_of(CHIN).tolist(), 1.0)
     source = np.array(sorted(values))
     lips = marks.on_contours(*LIP_CONTOURS) | marks.lips
     # the neck's lower end joins a body that does not move
-    end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - NECK_DISTANCE * es)
+    end = surface.open_edge & (surface.vertices[:, 1] < marks.point("2.1")[1] - TUNING.neck_distance * es)
     still = np.union1d(np.flatnonzero(lips | end), marks.vertices_of(UNMOVED_POINTS))
     inside = marks.inside_mouth
-    near, far = surface.distances(source, REACH * es), surface.distances(still, 3 * REACH * es)
-    free = reachable_region(near, far, REACH * es) & ~inside & ~lips
+    near, far = surface.distances(source, TUNING.reach * es), surface.distances(still, 3 * TUNING.reach * es)
+    free = reachable_region(near, far, TUNING.reach * es) & ~inside & ~lips
     fixed = np.concatenate([source, np.flatnonzero(lips)])
     given = np.concatenate([[values[int(vertex)] for vertex in source], np.zeros(int(lips.sum()))])
     if inside.any():
         depth = surface.distances(np.flatnonzero(lips | marks.on_inner_lips))
         below = below_bite(marks, surface.vertices, hinge)
-        clear = np.abs(below) > CHEEK_MARGIN * marks.fapu.MNS * 1024
-        jaws = np.flatnonzero(inside & (depth > LIP_DEPTH * es) & clear)
+        clear = np.abs(below) > TUNING.cheek_margin * marks.fapu.MNS * 1024
+        jaws = np.flatnonzero(inside & (depth > TUNING.lip_depth * es) & clear)
         fixed = np.concatenate([fixed, jaws])
         given = np.concatenate([given, (below[jaws] > 0).astype(np.float64)])
         free |= inside
     order = np.unique(fixed, return_index=True)[1]
-    field = solve_smooth_field(surface, free, fixed[order], given[order][:, None], slack=SLACK * es)
-    return trim_small(np.clip(field[:, 0], 0.0, 1.0), MIN_SHARE)
+    field = solve_smooth_field(surface, free, fixed[order], given[order][:, None], slack=TUNING.slack * es)
+    return trim_small(np.clip(field[:, 0], 0.0, 1.0), TUNING.min_share)
 
 
 def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
@@ -222,7 +219,7 @@ def _along_jaw(marks: Landmarks, line: Intp) -> Float64:
     first, last = length[chin[0]], length[chin[-1]]
     left = np.where(length < first, (first - length) / max(first, 1e-9), 0.0)
     right = np.where(length > last, (length - last) / max(length[-1] - last, 1e-9), 0.0)
-    return 1 - (1 - CORNER_SHARE) * smoothstep(np.maximum(left, right))
+    return 1 - (1 - TUNING.corner_share) * smoothstep(np.maximum(left, right))
 
 
 def _with_lip(marks: Landmarks, share: Float64) -> Float64:
@@ -239,9 +236,9 @@ def _with_lip(marks: Landmarks, share: Float64) -> Float64:
     fixed = np.flatnonzero(lower | upper | ~close | (share > 0.9))
     given = share.copy()
     given[upper] = 0.0
-    given[lower] = LIP_RIDE * along
-    field = solve_smooth_field(surface, close, fixed, given[fixed][:, None], slack=SLACK * es)[:, 0]
-    return trim_small(np.clip(field, 0.0, 1.0), MIN_SHARE)
+    given[lower] = TUNING.lip_ride * along
+    field = solve_smooth_field(surface, close, fixed, given[fixed][:, None], slack=TUNING.slack * es)[:, 0]
+    return trim_small(np.clip(field, 0.0, 1.0), TUNING.min_share)
 
 
 def _from_corners(marks: Landmarks, vertices: Intp) -> Float64:
@@ -276,7 +273,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
     elif fap == 45:
         share = length
     else:
-        share = length**TIP_BEND
+        share = length**TUNING.tip_bend
     field = share[:, None] * marks.step(fap)
     return linear_motion(limiter, np.arange(len(points)), field, *fap_limits(fap), human_range(fap))
 
@@ -286,7 +283,7 @@ def _tongue_roll(marks: Landmarks, points: Float64) -> Motion:
     middle, left, right = (marks.point(name) for name in ("6.2", "6.3", "6.4"))
     unit = marks.fapu.AU
     low, high = fap_limits(TONGUE_ROLL)
-    steps = np.append(np.linspace(low, 0.0, 3), np.linspace(0.0, high, ROLL_STEPS + 1))
+    steps = np.append(np.linspace(low, 0.0, 3), np.linspace(0.0, high, TUNING.roll_steps + 1))
     values: Float64 = np.unique(np.round(steps)).astype(np.float64)
     half = (left[0] - right[0]) / 2
     x, y = points[:, 0] - middle[0], points[:, 1] - middle[1]

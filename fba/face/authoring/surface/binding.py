@@ -12,8 +12,9 @@ import numpy.typing as npt
 from fba.arrays import Float64, Int32, Intp
 from fba.errors import ModelError
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds, weld_parts
-from fba.face.feature_points import FREE_POINTS, names, row_of
+from fba.face.feature_points import FREE_POINTS, names
 from fba.face.model import Part
+from fba.parameters import point_rows
 
 KINDS_OF_GROUP = {6: ("tongue",)}
 KINDS_OF_POINT = {
@@ -75,7 +76,7 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
     vertex = given.astype(np.int32)
     far: dict[str, float] = {}
     pieces = cache(lambda: _connected_pieces(parts, KINDS_OF_POINT["9.8"]))
-    for name, row in row_of().items():
+    for name, row in point_rows().items():
         if vertex[row] >= 0 or name in FREE_POINTS:
             continue
         pool = vertices_of_kinds(parts, kinds_for_point(name))
@@ -89,7 +90,7 @@ def bind_points(parts: Sequence[Part], points: Float64, bound: npt.ArrayLike | N
             far[name] = float(away[nearest])
         else:
             vertex[row] = pool[nearest]
-    tried = [name for name in names() if np.isfinite(points[row_of()[name]]).all()]
+    tried = [name for name in names() if np.isfinite(points[point_rows()[name]]).all()]
     if len(far) > len(tried) / 2 and len(far) > 3:
         worst = max(far, key=lambda name: far[name])
         raise ModelError(
@@ -115,7 +116,7 @@ def separate_lips(
     Lips touch, so the nearest vertex may be on the wrong one; the distance along the surface to the outer
     lip points (8.1, 8.2) tells them apart.
     """
-    bound, row = binding.bound.copy(), row_of()
+    bound, row = binding.bound.copy(), point_rows()
     vertex = surface.find(bound)
     outer = [int(vertex[row[name]]) for name in ("8.1", "8.2")]
     if min(outer) < 0:
@@ -161,7 +162,7 @@ def _nearest_in_jaw(vertices: Float64, piece: Intp, away: Float64, jaw: int, sla
 
 def lip_sides(surface: Surface, parts: Sequence[Part], bound: Int32) -> Intp | None:
     """Return (V,) 1 and 2 on upper and lower edges of a slit mouth, joined as a seam; None without."""
-    left, middle, right = surface.find(bound[[row_of()[name] for name in ("2.4", "2.2", "2.5")]]).tolist()
+    left, middle, right = surface.find(bound[[point_rows()[name] for name in ("2.4", "2.2", "2.5")]]).tolist()
     if min(left, middle, right) < 0:
         return None
     walk = np.concatenate([surface.path(left, middle), surface.path(middle, right)])

@@ -13,10 +13,10 @@ from fba.arrays import Bool, Float64, Int32, Intp
 from fba.face.authoring.surface.binding import SURFACE_KINDS, lip_sides
 from fba.face.authoring.surface.surface import Surface, weld_parts
 from fba.face.fapu import Fapu
-from fba.face.feature_points import names, neutral_points, row_of
+from fba.face.feature_points import names, neutral_points
 from fba.face.model import Part
 from fba.face.points import DIRECTIONS
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 
 CONTOURS = {
     "upper inner lip": ("2.4", "2.6", "2.2", "2.7", "2.5"),
@@ -55,7 +55,7 @@ class Landmarks:
 
     def point(self, name: str) -> Float64:
         """Return (3,) position of a feature point, metres; NaN where unknown."""
-        return np.asarray(self.points[row_of()[name]])
+        return np.asarray(self.points[point_rows()[name]])
 
     def has(self, *wanted: str) -> bool:
         """Return whether all these feature points stand on the surface."""
@@ -149,7 +149,7 @@ class Landmarks:
 
     def point_or_average(self, name: str) -> Float64:
         """Return (3,) position of a feature point; if unknown, as on an average adult head."""
-        return np.asarray(self.points_or_average[row_of()[name]])
+        return np.asarray(self.points_or_average[point_rows()[name]])
 
 
 def find_landmarks(surface: Surface, points: Float64, bound: Int32) -> Landmarks:

@@ -13,10 +13,9 @@ from fba.arrays import Float64, Floating
 from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face.authoring.surface._motion_limits import human_range
 from fba.face.deform._deformer import Deformer
-from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.points import DIRECTIONS, OPEN_JAW
-from fba.parameters import FAP_COUNT, faps
+from fba.parameters import FAP_COUNT, faps, point_rows
 from fba.text_files import packaged_rows
 
 MOUTH = (OPEN_JAW, *range(4, 14), 16, 17, *range(51, 61))
@@ -90,8 +89,8 @@ def _measure(
         own = np.flatnonzero((model.bound >= start) & (model.bound < start + len(field)))
         moved[own] = field[model.bound[own] - start]
     entries = [faps()[number - 1] for number in numbers if number in model.table_of]
-    known = [entry for entry in entries if np.isfinite(moved[row_of()[entry.feature_points[0]]]).all()]
-    rows = [row_of()[entry.feature_points[0]] for entry in known]
+    known = [entry for entry in entries if np.isfinite(moved[point_rows()[entry.feature_points[0]]]).all()]
+    rows = [point_rows()[entry.feature_points[0]] for entry in known]
     ways = np.array([DIRECTIONS[entry.positive] for entry in known], dtype=np.float64)
     units = np.array([model.fapu[entry.unit] for entry in known])
     if not known or np.linalg.norm(moved[rows], axis=1).max() < MIN_MOTION * apart:

@@ -9,6 +9,7 @@ moved onto the skin.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,6 @@ from fba.errors import ModelError, Remedy
 from fba.face.authoring.surface.binding import SURFACE_KINDS
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, flat_width, sphere
-from fba.face.feature_points import row_of
 from fba.face.importers.assembly._outlines import (
     find_eye_loop,
     lid_points_of_loop,
@@ -31,38 +31,35 @@ from fba.face.importers.assembly._warping import warp_points
 from fba.face.model import Part
 from fba.face.points import EYEBALL_PER_IRIS
 from fba.face.shape_names import canonical_names, fap_of
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 
-MIN_OUTSIDE_Z = 0.2
-"""Skin whose normal has a smaller z than this is the inside of the mouth, or an ear."""
-MAX_IN_COLUMN = 3000
-"""Number of vertices, at most, of one column of the face that are compared with each other."""
-MIN_PARTED_SHARE = 0.25
-"""Lips part by at least this share of the jaw's motion."""
-MAX_HALF_MOUTH = 0.7
-"""Width that half a mouth has at most, in distances of the eyes."""
-SLIT_STEP = 0.02
-"""Width of a step along the line between the lips, in distances of the eyes."""
-SLIT_END = 0.2
-"""Lips still part at the corner by this share of their gap in the middle."""
-MIN_LOOP_VERTICES = 6
-"""Number of vertices that the opening of an eye has around it at least."""
-FRONT_TEETH = 0.12
-"""Distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils."""
-CORNER_WIDTH = 0.055
-"""Distance of the outer corner of the lips from the inner one, as a share of that of the pupils."""
-MAX_RADIUS_RATIO = 1.3
-"""Ratio of the radii above which two shells are not a pair of eyes."""
-MIN_PUPIL_DISTANCE = 0.7
-"""Distance that a pupil is in front of its eyeball's centre at least, in radii."""
 RIGHT_LID = ("3.2", "3.4", "3.8", "3.12")
 """Points of the right lids' margins and of the corners between them."""
-MAX_OPENING_DIFFERENCE = 0.02
-"""Share by which the heights of both eyes' openings differ, at most, where lids stay as located."""
 EYE_CORNERS = {"left": ("3.7", "3.11"), "right": ("3.8", "3.12")}
 """Left and right corner of each eye."""
-MIN_FAPS = 20
-"""With at least this many shapes named after FAPs, points are where these move most."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Constants of the search for feature points."""
+
+    min_outside_z: float = 0.2  # z of normals; with less, skin is the inside of the mouth, or an ear
+    max_in_column: int = 3000  # vertices of a column of the face that are compared with each other
+    min_parted_share: float = 0.25  # lips part by at least this share of the jaw's motion
+    max_half_mouth: float = 0.7  # width that half a mouth has at most, in distances of the eyes
+    slit_step: float = 0.02  # width of a step along the line between the lips, in distances of the eyes
+    slit_end: float = 0.2  # lips still part at the corner by this share of their gap in the middle
+    min_loop_vertices: int = 6  # number of vertices that the opening of an eye has around it at least
+    # distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils
+    front_teeth: float = 0.12
+    corner_width: float = 0.055  # between outer and inner corner of the lips, in distances of the pupils
+    max_radius_ratio: float = 1.3  # ratio of the radii above which two shells are not a pair of eyes
+    min_pupil_distance: float = 0.7  # of a pupil from its eyeball's centre, forwards, in radii
+    max_opening_difference: float = 0.02  # share by which openings differ where lids stay as located
+    min_faps: int = 20  # with at least this many shapes named after FAPs, points are where these move most
+
+
+TUNING = Tuning()
 
 
 class Eye(NamedTuple):
@@ -89,7 +86,7 @@ def find_points(
         raise ModelError(f"{path}: no part is skin; give the kinds of the parts").with_remedies(POINTS)
     by_fap = {fap: morph for name, morph in skin[0].morphs.items() if (fap := fap_of(name)) is not None}
     vertices = skin[0].part.vertices.astype(np.float64)
-    if len(by_fap) >= MIN_FAPS:
+    if len(by_fap) >= TUNING.min_faps:
         points = _from_faps(vertices, by_fap) | _lids_by_loops(pieces, eyes)
     else:
         points = _from_arkit(pieces, skin[0], vertices, eyes, path)
@@ -109,7 +106,7 @@ def _open_alike(points: Mapping[str, Float64]) -> bool:
     if any(name not in points for pair in LID_POINTS.values() for name in pair):
         return False
     left, right = (float(points[upper][1] - points[lower][1]) for upper, lower in LID_POINTS.values())
-    return abs(right - left) < MAX_OPENING_DIFFERENCE * left
+    return abs(right - left) < TUNING.max_opening_difference * left
 
 
 def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
@@ -117,21 +114,21 @@ def find_eye_points(pieces: Sequence[Piece], path: str) -> Float64:
 
     Shells that cannot be two eyes, such as a bun of hair, give nothing: they overlap, or differ in size.
     """
-    points = np.full((len(row_of()), 3), np.nan)
+    points = np.full((len(point_rows()), 3), np.nan)
     try:
         eyes = find_eyes(pieces, path)
     except ModelError:
         return points
     (left, size_left, _), (right, size_right, _) = eyes["left"], eyes["right"]
-    alike = max(size_left, size_right) < MAX_RADIUS_RATIO * min(size_left, size_right)
+    alike = max(size_left, size_right) < TUNING.max_radius_ratio * min(size_left, size_right)
     if not alike or left[0] - right[0] < size_left + size_right:
         return points
     found = _lids_by_loops(pieces, eyes)
     for side, (centre, radius, pupil) in eyes.items():
-        if pupil[2] - centre[2] > MIN_PUPIL_DISTANCE * radius:
+        if pupil[2] - centre[2] > TUNING.min_pupil_distance * radius:
             found[PUPIL_POINT[side]] = pupil
     for name, position in found.items():
-        points[row_of()[name]] = position
+        points[point_rows()[name]] = position
     return points
 
 
@@ -163,9 +160,9 @@ def _teeth(pieces: Sequence[Piece], located: Mapping[str, Float64]) -> dict[str,
         for piece in pieces:
             if piece.part.name == row:
                 vertices = piece.part.vertices.astype(np.float64)
-                front = vertices[:, 2] > vertices[:, 2].max() - FRONT_TEETH * apart
+                front = vertices[:, 2] > vertices[:, 2].max() - TUNING.front_teeth * apart
                 aside = np.abs(vertices[:, 0] - middle)
-                front &= aside < max(FRONT_TEETH * apart, float(aside[front].min()) * 1.001)
+                front &= aside < max(TUNING.front_teeth * apart, float(aside[front].min()) * 1.001)
                 points[name] = vertices[int(np.where(front, way * vertices[:, 1], -np.inf).argmax())]
     return points
 
@@ -188,7 +185,7 @@ def find_eyes(pieces: Sequence[Piece], path: str) -> dict[str, Eye]:
                 away = np.hypot(vertices[:, 0] - centre[0], vertices[:, 1] - centre[1])
                 ahead = vertices[:, 2] - centre[2]
                 # the flat back of half a ball has a vertex on the axis, too
-                least = MIN_PUPIL_DISTANCE * radius
+                least = TUNING.min_pupil_distance * radius
                 away[ahead < (least if ahead.max() > least else 0.0)] = np.inf
                 eyes[side] = Eye(centre, radius, vertices[int(away.argmin())])
     missing = [f"the {side} eye" for side in ("left", "right") if side not in eyes]
@@ -239,7 +236,7 @@ def _from_arkit(
             f"(2.2, 2.3, 8.3, 8.4) would be found{has}"
         ).with_remedies(POINTS)
     assert skin.part.normals is not None
-    facing = skin.part.normals[:, 2].astype(np.float64) > MIN_OUTSIDE_Z
+    facing = skin.part.normals[:, 2].astype(np.float64) > TUNING.min_outside_z
     for side in lidless:
         points |= _lids(vertices, shapes[f"eyeBlink{side.title()}"], eyes[side], side)
     return points | _mouth(skin.part, facing, shapes, eyes, path)
@@ -286,7 +283,7 @@ def _lids_by_loops(pieces: Sequence[Piece], eyes: Mapping[str, Eye]) -> dict[str
     points: dict[str, Float64] = {}
     for side, (centre, radius, pupil) in eyes.items():
         loop = find_eye_loop(surface, centre, radius)
-        if len(loop) >= MIN_LOOP_VERTICES:
+        if len(loop) >= TUNING.min_loop_vertices:
             found = lid_points_of_loop(surface.vertices, loop, float(pupil[0]))
             named = zip(LID_POINTS[side] + EYE_CORNERS[side], found, strict=False)
             points |= {name: surface.vertices[vertex] for name, vertex in named}
@@ -337,7 +334,7 @@ def _mouth(
             points[inner] = vertices[int(np.where(within & front, away, np.inf).argmin())]
         points[inner] = on_edge.get(inner, points[inner])
         # the contours need skin between them: next to each other, one could not move without the other
-        beyond = points[inner] + (CORNER_WIDTH * apart * sign, 0.0, 0.25 * CORNER_WIDTH * apart)
+        beyond = points[inner] + (TUNING.corner_width * apart * sign, 0.0, 0.25 * TUNING.corner_width * apart)
         away = np.linalg.norm(vertices - beyond, axis=1)
         points[outer] = vertices[int(np.where(candidates, away, np.inf).argmin())]
         line = ahead & (np.abs(vertices[:, 1] - vertices[upper, 1]) < 0.1 * apart)
@@ -358,17 +355,17 @@ def _end_of_slit(
     """
     first = 0.0
     last: int | None = None
-    for step in np.arange(0.0, MAX_HALF_MOUTH, SLIT_STEP) * apart:
+    for step in np.arange(0.0, TUNING.max_half_mouth, TUNING.slit_step) * apart:
         column = np.flatnonzero((np.abs(vertices[:, 0] - middle - sign * step) < 0.04 * apart) & near)
-        if not 0 < len(column) <= MAX_IN_COLUMN:
+        if not 0 < len(column) <= TUNING.max_in_column:
             continue
         between = np.linalg.norm(vertices[column][:, None] - vertices[column][None], axis=2)
         parted = np.where(between < 0.04 * apart, drop[column][None] - drop[column][:, None], 0.0)
         above = np.unravel_index(int(parted.argmax()), parted.shape)[0]
         first = max(first, float(parted.max()))
-        if not first > MIN_PARTED_SHARE * float(drop.max()):
+        if not first > TUNING.min_parted_share * float(drop.max()):
             return None
-        if parted.max() > SLIT_END * first:
+        if parted.max() > TUNING.slit_end * first:
             last = int(column[above])
     if last is None:
         return None
@@ -385,15 +382,15 @@ def _lip_pair(
     column = np.flatnonzero((np.abs(vertices[:, 0] - x) < 0.04 * apart) & ahead)
     if not len(column) or not drop[column].max() > 0:
         return None
-    if len(column) > MAX_IN_COLUMN:  # a very fine mesh: every few vertices are enough
-        column = column[:: len(column) // MAX_IN_COLUMN + 1]
+    if len(column) > TUNING.max_in_column:  # a very fine mesh: every few vertices are enough
+        column = column[:: len(column) // TUNING.max_in_column + 1]
     positions, falls = vertices[column], drop[column]
     between = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     differs = falls[None] - falls[:, None]
     for reach in (0.04, 0.08, 0.16):
         near = np.where(between < reach * apart, differs, -np.inf)
         above, below = np.unravel_index(int(near.argmax()), near.shape)
-        if near[above, below] > MIN_PARTED_SHARE * falls.max():
+        if near[above, below] > TUNING.min_parted_share * falls.max():
             break
     else:
         return None

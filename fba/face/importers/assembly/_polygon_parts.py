@@ -13,9 +13,9 @@ import numpy as np
 from fba.arrays import Bool, Float32, Float64, Int32, Intp
 from fba.errors import ModelError
 from fba.face.eyeball import LID_POINTS, PUPIL_POINT, sphere
-from fba.face.feature_points import row_of
 from fba.face.model import Material, Part
 from fba.mesh import Polygons, connected, triangulate, vertex_normals
+from fba.parameters import point_rows
 
 LOOKS = {
     "skin": Material("skin", (0.71, 0.47, 0.36), 0.55),
@@ -133,8 +133,8 @@ def _is_grey(material: Material) -> bool:
 def _with_iris(part: Part, points: Float64) -> Part:
     """Return the eye with a neutral iris: as wide as the lids are apart, its pupil a third of it."""
     side = "left" if "left" in part.name else "right"
-    pupil = points[row_of()[PUPIL_POINT[side]]]
-    upper, lower = (float(points[row_of()[name], 1]) for name in LID_POINTS[side])
+    pupil = points[point_rows()[PUPIL_POINT[side]]]
+    upper, lower = (float(points[point_rows()[name], 1]) for name in LID_POINTS[side])
     wide = upper - lower
     ball = sphere(part)
     if ball is None or not np.isfinite(pupil).all() or not wide > 0:

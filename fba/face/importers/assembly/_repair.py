@@ -6,17 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fba.easing import smoothstep
 from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.authoring.regions._eye_opening import LIDS
 from fba.face.authoring.regions._eyes import PUPIL_OF_IRIS
 from fba.face.checks._fap_checks import count_errors, region_table
 from fba.face.checks._posing import Poser
 from fba.face.eyeball import PUPIL_FAP, eyeballs, pupil_diameter
-from fba.face.feature_points import row_of
 from fba.face.model import FaceModel
 from fba.face.points import DILATE_PUPIL
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
+from fba.sampling import smoothstep
 
 FADE_SHARES = (0.75, 0.97)
 """Shares of the reach of a region between which a motion that leaves it is faded out."""
@@ -99,7 +98,7 @@ def _candidates(
 def _within_region(model: FaceModel, table: FaceDefTables) -> FaceDefTables:
     """Return the motion of a table, faded out towards the edge of the region of its FAP."""
     names, reach = region_table()[table.fap]
-    points = model.points[[row_of()[name] for name in names]]
+    points = model.points[[point_rows()[name] for name in names]]
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return table

@@ -10,11 +10,11 @@ from fba.arrays import Float64, Intp
 from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.checks._fap_checks import count_errors
 from fba.face.checks._posing import Poser
-from fba.face.feature_points import MATES, MIRRORED, row_of
+from fba.face.feature_points import MATES, MIRRORED
 from fba.face.importers.assembly._pieces import turn_pieces
 from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import FaceModel
-from fba.parameters import faps
+from fba.parameters import faps, point_rows
 from fba.rotations import between
 
 MIRRORED_POINTS = 0.02
@@ -69,7 +69,7 @@ def stand_upright_by_points(pieces: Sequence[Piece], points: Float64) -> tuple[l
 
     The angle is 0 where nothing was turned: where points of both sides say nothing, or not the same.
     """
-    row = row_of()
+    row = point_rows()
     pairs = np.array([(points[row[left]], points[row[right]]) for left, right in MIRRORED.items()])
     pairs = pairs[np.isfinite(pairs).all(axis=(1, 2))]
     ways = pairs[:, 0] - pairs[:, 1] if len(pairs) else np.zeros((0, 3))
@@ -182,7 +182,7 @@ def _counterparts(model: FaceModel) -> Intp:
     """Return (V,) for each vertex that of the same kind of part nearest to its mirror image."""
     from scipy.spatial import cKDTree
 
-    pupils = model.points[[row_of()["3.5"], row_of()["3.6"]], 0]
+    pupils = model.points[[point_rows()["3.5"], point_rows()["3.6"]], 0]
     middle = float(pupils.mean()) if np.isfinite(pupils).all() else 0.0
     # vertices of touching lips coincide: the vector to their neighbours tells the lips apart
     arms = NEIGHBOUR_WEIGHT * _neighbour_arms(model)
@@ -193,7 +193,7 @@ def _counterparts(model: FaceModel) -> Intp:
     for kind in np.unique(kinds):
         own = np.flatnonzero(kinds == kind)
         result[own] = own[cKDTree(vertices[own]).query(mirrored[own])[1]]
-    bound = {name: int(model.bound[row]) for name, row in row_of().items()}
+    bound = {name: int(model.bound[row]) for name, row in point_rows().items()}
     for left, right in MIRRORED.items():
         if bound[left] >= 0 and bound[right] >= 0:
             result[bound[left]], result[bound[right]] = bound[right], bound[left]

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64
-from fba.easing import smoothstep
 from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.authoring.surface._motion import UNMOVED_DISTANCE
 from fba.face.authoring.surface.landmarks import weld_skin
@@ -21,6 +20,7 @@ from fba.face.checks._fap_checks import count_errors
 from fba.face.checks._posing import Poser
 from fba.face.model import FaceModel
 from fba.parameters import faps
+from fba.sampling import smoothstep
 
 STRETCH = (6, 7, 53, 54)
 """FAPs of the corners of the mouth, inner and outer."""

@@ -7,8 +7,9 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from fba.arrays import Float64
-from fba.face.feature_points import FREE_POINTS, MIRRORED, names, neutral_points, row_of
+from fba.face.feature_points import FREE_POINTS, MIRRORED, names, neutral_points
 from fba.face.importers.assembly._polygon_parts import Piece
+from fba.parameters import point_rows
 
 ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
 """Parts that points of the teeth stand on."""
@@ -37,7 +38,7 @@ def warp_points(
 
     from fba.face.authoring.surface.binding import kinds_for_point
 
-    row, adult = row_of(), neutral_points()
+    row, adult = point_rows(), neutral_points()
     known = dict(located)
     middle = float((known["3.5"] + known["3.6"])[0]) / 2
     for left, right in MIRRORED.items():
@@ -82,7 +83,7 @@ def warp_points(
 
 def _put_folds_beyond_lids(pieces: Sequence[Piece], points: Float64) -> None:
     """Move the folds of lids, in place, that the warp put on the wrong side of the margin."""
-    row = row_of()
+    row = point_rows()
     apart = float(points[row["3.5"], 0] - points[row["3.6"], 0])
     skin = [piece.part.vertices.astype(np.float64) for piece in pieces if piece.part.kind == "skin"]
     vertices = np.concatenate(skin) if skin else np.zeros((0, 3))

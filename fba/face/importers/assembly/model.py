@@ -12,7 +12,7 @@ import numpy as np
 from fba.arrays import Bool, Float64, Int32
 from fba.choices import UpAxis
 from fba.errors import ModelError, OptionError
-from fba.face.feature_points import FREE_POINTS, names, row_of
+from fba.face.feature_points import FREE_POINTS, names
 from fba.face.importers.assembly._definitions import define_by_shapes
 from fba.face.importers.assembly._pieces import assemble, shift_piece, turn_pieces
 from fba.face.importers.assembly._polygon_parts import Piece, apply_default_materials
@@ -21,6 +21,7 @@ from fba.face.importers.assembly._symmetry import stand_upright_by_points
 from fba.face.importers.assembly._teeth_clearance import clear_teeth
 from fba.face.model import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
+from fba.parameters import point_rows
 
 ADULT_PUPIL_DISTANCE = 0.062
 """Metres between the pupils of an adult."""
@@ -31,7 +32,7 @@ HEAD_RADIUS = 2.5
 """Distance from the middle of the head within which skin is that of the head, in distances of the pupils."""
 AXES = {"y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
 """Rotations to +x left, +y up, +z forward, by the vertical axis of a file; faces with z up look to -y."""
-EYE_ROWS = [row_of()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
+EYE_ROWS = [point_rows()[name] for name in ("3.5", "3.6", "3.1", "3.2", "3.7", "3.11", "3.8", "3.12")]
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def finish_import(
         if angle:
             all_notes["position"] = f"turned by {np.degrees(angle):.1f} degrees, so that both sides are level"
     size, how = metres_per_unit(points, options.unit)
-    pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
+    pupils = points[[point_rows()["3.5"], point_rows()["3.6"]]]
     middle = float(np.nanmean(pupils[:, 0])) if np.isfinite(pupils[:, 0]).any() else None
     origin = pupils.mean(axis=0) if np.isfinite(pupils).all() else np.zeros(3)
     parts = [
@@ -138,7 +139,7 @@ def bind_by_number(pieces: Sequence[Piece], vertices: Mapping[str, int]) -> Int3
         start += len(piece.part.vertices)
     for name, vertex in vertices.items():
         if name not in FREE_POINTS and vertex in first:
-            bound[row_of()[name]] = first[vertex]
+            bound[point_rows()[name]] = first[vertex]
     return bound
 
 
@@ -165,7 +166,7 @@ def metres_per_unit(points: Float64, unit: float | None = None) -> tuple[float, 
 
 def pupil_distance(points: Float64) -> float:
     """Return the distance of the pupils, or of the middles of the eyes; ModelError where unknown."""
-    row = row_of()
+    row = point_rows()
     for left, right in ((("3.5",), ("3.6",)), (("3.7", "3.11"), ("3.8", "3.12")), (("3.1",), ("3.2",))):
         ends = [points[[row[name] for name in names]].mean(axis=0) for names in (left, right)]
         apart = float(np.linalg.norm(ends[0] - ends[1]))

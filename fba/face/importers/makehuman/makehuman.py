@@ -17,12 +17,12 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError, Remedy
-from fba.face.feature_points import row_of
 from fba.face.importers.assembly._pieces import shift_piece
 from fba.face.importers.assembly._polygon_parts import LOOKS, Piece, make_piece, polygon_components
 from fba.face.importers.assembly.model import bind_by_number
 from fba.face.model import FaceModel, Material, Part
 from fba.mesh import Polygons, connected, read_obj
+from fba.parameters import point_rows
 from fba.text_files import find_beside, packaged_rows, parse_integer, parse_number, read_bytes, read_words
 
 METRES = 0.1
@@ -88,7 +88,7 @@ def read_makehuman(path: str | os.PathLike[str]) -> MakeHumanHead:
         faces = base.in_groups(*groups)
         pieces.append(make_piece(base, faces, name, kind, scale=METRES, material=LOOKS[kind]))
     points, bound = _feature_points(base, pieces)
-    pupils = points[[row_of()["3.5"], row_of()["3.6"]]]
+    pupils = points[[point_rows()["3.5"], point_rows()["3.6"]]]
     shift = -pupils.mean(axis=0)
     pieces = [shift_piece(piece, 1.0, shift) for piece in pieces]
     points = points + shift
@@ -203,17 +203,17 @@ def _eyeball(eyes: Polygons, side: float) -> Bool:
 
 def _feature_points(base: Polygons, pieces: list[Piece]) -> tuple[Float64, Int32]:
     """Return (points (84, 3) in metres, origin as in the base mesh; vertices (84,) they are bound to)."""
-    points = np.full((len(row_of()), 3), np.nan)
+    points = np.full((len(point_rows()), 3), np.nan)
     rows = _rows("makehuman.csv", "point")
     for name, vertices in rows.items():
-        points[row_of()[name]] = base.vertices[list(vertices)].mean(axis=0) * METRES
+        points[point_rows()[name]] = base.vertices[list(vertices)].mean(axis=0) * METRES
     single = {name: vertices[0] for name, vertices in rows.items() if len(vertices) == 1}
     bound = bind_by_number(pieces, single)
     start = 0
     for piece in pieces:
         part = piece.part
         if part.kind == "eye":
-            row = row_of()["3.5" if "left" in part.name else "3.6"]
+            row = point_rows()["3.5" if "left" in part.name else "3.6"]
             front = _front(part.vertices)
             points[row], bound[row] = part.vertices[front], start + front
         start += len(part.vertices)

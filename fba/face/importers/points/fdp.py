@@ -17,9 +17,9 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.errors import ModelError, warn
-from fba.face.feature_points import MIRRORED, names, row_of
+from fba.face.feature_points import MIRRORED, names
 from fba.mesh import read_vrml
-from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP
+from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, point_rows
 from fba.text_files import find_beside, parse_integer, parse_number, read_bytes, read_words
 
 DISTANCES = ("ENS0", "ES0", "IRISD0", "MNS0", "MW0")
@@ -95,7 +95,7 @@ def repair_sides(points: Float64) -> tuple[Float64, list[tuple[str, str]], list[
     Unchanged where most pairs do not lie left and right in x: then the axes are not the standard's.
     """
     points = points.copy()
-    row = row_of()
+    row = point_rows()
     midline = points[[row[name] for name in ("2.1", "2.2", "2.3", "2.10", "8.1", "8.2", "9.3", "9.15")], 0]
     middle = float(np.nanmedian(midline)) if np.isfinite(midline).any() else 0.0
     swaps: list[tuple[str, str]] = []
@@ -153,7 +153,7 @@ def read_xface(path: str) -> Fdp:
     for number, element in enumerate(root.iter("fdp"), start=1):
         where = f"{path}: <fdp> number {number}"
         name, mesh_name = element.get("name", ""), element.get("affects", "")
-        if name not in row_of():
+        if name not in point_rows():
             raise ModelError(f"{where}: there is no feature point {name[:40]!r}")
         index = parse_integer(element.get("index", ""), where, "index, the vertex of the point,")
         inside = tuple(  # one for all influences
@@ -216,7 +216,7 @@ def xface_points(fdp: Fdp) -> Float64:
                 f"{fdp.path}: feature point {name} is vertex {vertex} of shape {index} of {path.name}, "
                 "which does not exist; is it the mesh this file was made for?"
             )
-        points[row_of()[name]] = shapes[index].vertices[vertex]
+        points[point_rows()[name]] = shapes[index].vertices[vertex]
     return repair_sides_with_warning(points, fdp.path, stacklevel=4)
 
 
@@ -259,13 +259,15 @@ def _load_text(path: str) -> Fdp:
             raise ModelError(
                 f"{where}: a feature point is 'GROUP.INDEX x y z MESH.VERTEX', not {' '.join(tokens)[:60]!r}"
             )
-        elif tokens[0] not in row_of():
+        elif tokens[0] not in point_rows():
             unknown.append(tokens[0])
         else:
             point = tokens[0]
-            if np.isfinite(points[row_of()[point]]).any():
+            if np.isfinite(points[point_rows()[point]]).any():
                 raise ModelError(f"{where}: feature point {point} is listed twice")
-            points[row_of()[point]] = [parse_number(token, where, "a coordinate") for token in tokens[1:4]]
+            points[point_rows()[point]] = [
+                parse_number(token, where, "a coordinate") for token in tokens[1:4]
+            ]
             if len(tokens) == 5:
                 mesh, _, vertex = tokens[4].partition(".")
                 index = parse_integer(vertex, where, "the vertex in MESH.VERTEX")

@@ -15,8 +15,9 @@ import numpy as np
 from fba.arrays import Float64
 from fba.atomic import atomic
 from fba.errors import ModelError
-from fba.face.feature_points import names, row_of
+from fba.face.feature_points import names
 from fba.face.importers.points.fdp import read_fdp, xface_points
+from fba.parameters import point_rows
 from fba.text_files import parse_integer, parse_number, read_bytes, read_lines
 
 MAX_JSON = 1 << 24
@@ -126,16 +127,16 @@ def _from_csv(path: str) -> GivenPoints:
         tokens = tokens or [""]  # nothing but quotation marks
         was_first, first = first, False
         name = tokens[0]
-        if name not in row_of():
+        if name not in point_rows():
             if was_first and not name[:1].isdigit():
                 continue  # titles
             raise ModelError(f"{where}: there is no feature point {name[:40]!r}; they are named 2.1 to 11.6")
-        if name in vertices or np.isfinite(points[row_of()[name]]).any():
+        if name in vertices or np.isfinite(points[point_rows()[name]]).any():
             raise ModelError(f"{where}: feature point {name} is listed twice")
         if len(tokens) == 2:
             vertices[name] = parse_integer(tokens[1], where, "a vertex")
         elif len(tokens) == 4:
-            points[row_of()[name]] = [parse_number(token, where, "a coordinate") for token in tokens[1:]]
+            points[point_rows()[name]] = [parse_number(token, where, "a coordinate") for token in tokens[1:]]
         else:
             raise ModelError(f"{where}: 'name,x,y,z' or 'name,vertex' is expected, not {bare[:60]!r}")
     return _check_given(GivenPoints(points, vertices), path)
@@ -145,7 +146,7 @@ def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
     points = np.full((len(names()), 3), np.nan)
     vertices: dict[str, int] = {}
     for name, value in content.items():
-        if name not in row_of():
+        if name not in point_rows():
             raise ModelError(
                 f"{where}: there is no feature point {str(name)[:40]!r}; they are named 2.1 to 11.6"
             )
@@ -160,7 +161,7 @@ def _from_mapping(content: Mapping[Any, Any], where: str) -> GivenPoints:
             raise ModelError(
                 f"{where}: feature point {name} must be [x, y, z] or a vertex, not {_short(value)}"
             )
-        points[row_of()[name]] = position
+        points[point_rows()[name]] = position
     return _check_given(GivenPoints(points, vertices), where)
 
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
-from fba.face import Resolver
-from fba.face.resolve import FaceSettings
+from fba.face import FaceSettings, Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, bap_numbers, baps, faps
 from fba_player._ui.panels._puppet_rows import reach
 
@@ -46,7 +45,7 @@ class Course:
 class Courses:
     """Courses of the parameters of a timeline, computed when they are needed.
 
-    timeline: a `fba_player.playback.timeline.Timeline`; it may grow. model: its face. later: seconds that are
+    timeline: a `Timeline`; it may grow. model: its face. later: seconds that are
     added to its times.
     """
 

@@ -10,7 +10,7 @@ import numpy as np
 from fba.codec import PartInfo, StreamInfo
 from fba_player._ui import theme
 from fba_player._ui.panels.panel import Panel, facts, heading, wrapped
-from fba_player.playback.timeline import clock_text
+from fba_player.playback._timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.session._session import Session
 

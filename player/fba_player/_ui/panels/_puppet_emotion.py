@@ -13,8 +13,8 @@ from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
 from fba_player._ui import theme
 from fba_player._ui.panels.panel import choose_name, heading, shorten, tooltip, wrapped
 from fba_player.session._mood import PuppetMood
+from fba_player.session._puppet import Expression, Viseme
 from fba_player.session.performer import Performer
-from fba_player.session.puppet import Expression, Viseme
 from fba_player.view._geometry import Box, overlap
 
 MAX_PLANE_HEIGHT = 240.0

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
+from fba.text_files import packaged_rows
 
 RANGE_FACTOR = 1.5
 """Range of a FAP's slider relative to the value that the gallery shows."""
@@ -61,9 +60,8 @@ class Group:
 @cache
 def groups() -> tuple[Group, ...]:
     """Return all groups: those of the face, then those of the body."""
-    text = (files(__package__) / "puppet.csv").read_text(encoding="utf-8")
     groups = []
-    for line in csv.DictReader(text.splitlines()):
+    for line in packaged_rows(__package__, "puppet.csv"):
         names = line["parameters"].split()
         rows = _fap_rows(names) if line["kind"] == "fap" else _bap_rows(names)
         groups.append(Group(line["group"], line["kind"], rows))
@@ -73,8 +71,7 @@ def groups() -> tuple[Group, ...]:
 @cache
 def reach(number: int) -> float:
     """Return the amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
-    text = (files("fba_player.export") / "contact_sheet.csv").read_text(encoding="utf-8")
-    rows = csv.DictReader(text.splitlines())
+    rows = packaged_rows("fba_player.export", "contact_sheet.csv")
     return next(abs(float(row["value"])) for row in rows if int(row["fap"]) == number)
 
 

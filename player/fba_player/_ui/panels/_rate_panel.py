@@ -19,7 +19,7 @@ from fba_player._ui.panels._curve_data import Course, TimeZoom
 from fba_player._ui.panels._curve_plot import CURVE_HEIGHT, LABEL_HEIGHT, Lane, Lanes
 from fba_player._ui.panels.panel import Panel, tooltip
 from fba_player._ui.ruler import Ruler
-from fba_player.playback.timeline import clock_text
+from fba_player.playback._timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session

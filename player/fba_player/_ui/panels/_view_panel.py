@@ -13,7 +13,7 @@ from fba_player.scene.scene import Scene
 from fba_player.session._actions import act
 from fba_player.session._keys import key_of
 from fba_player.session._session import Session
-from fba_player.view.camera import DISTANCES, PITCH_LIMIT, PRESETS
+from fba_player.view._camera import DISTANCES, PITCH_LIMIT, PRESETS
 from fba_player.view.switches import SWITCHES, Switch, Switches
 
 LOOK_TEXTS = {"figure": "figure", "points": "points and bones"}

@@ -1,4 +1,4 @@
-"""Captures at irregular times: their nominal rates, their gaps, and their values at the times of frames."""
+"""Values at times: rates and gaps of irregular times, interpolation at the times of frames, smooth steps."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from fractions import Fraction
 from math import ceil, floor
 
 import numpy as np
+import numpy.typing as npt
 
 from fba.arrays import Float64, Int64
 from fba.errors import ModelError
@@ -87,4 +88,16 @@ def interpolate(times: Float64, values: Sequence[Float64], at: Float64, limits: 
     for array in values:
         weight = share.reshape(-1, *[1] * (array.ndim - 1))
         result.append(array[before] * (1 - weight) + array[after] * weight)
+    return result
+
+
+def regular_times(count: int, rate: Fraction, first: float = 0.0) -> Float64:
+    """Return the times of frames at a constant rate: float64 (count,), seconds."""
+    return first + np.arange(count, dtype=np.float64) * np.float64(1 / rate)
+
+
+def smoothstep(value: npt.ArrayLike) -> Float64:
+    """Return a float64 array of value's shape: 0 up to 0, 1 from 1 on, 3 t^2 - 2 t^3 between."""
+    t = np.clip(np.asarray(value, dtype=np.float64), 0.0, 1.0)
+    result: Float64 = t * t * (3.0 - 2.0 * t)
     return result

@@ -17,8 +17,7 @@ import numpy.typing as npt
 
 from fba.animation import Animation
 from fba.arrays import Array, Float32, Float64, Int32, Int64, Intp
-from fba.face import Resolver
-from fba.face.resolve import FaceSettings
+from fba.face import FaceSettings, Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT
 from fba.tracks import hold
 

@@ -6,20 +6,18 @@ mixed from others by the rules; its FAPs in the table are added.
 
 from __future__ import annotations
 
-import csv
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Bool, Float32
+from fba.emotion._expression import FAMILIES, Expression, whissel_points
 from fba.emotion._mixing import mix
 from fba.emotion._rules import Rules, limited
-from fba.emotion.expression import FAMILIES, Expression, whissel_points
 from fba.errors import OptionError, did_you_mean
 from fba.face import Definitions
-from fba.face.mates import fill
-from fba.parameters import EXPRESSIONS, FAP_COUNT, fap_numbers
+from fba.parameters import EXPRESSIONS, FAP_COUNT, fap_numbers, fill_from_mates
+from fba.text_files import packaged_rows
 
 
 def expressions() -> tuple[Expression, ...]:
@@ -44,8 +42,7 @@ def expression(name: str) -> Expression:
 
 @cache
 def _by_name() -> dict[str, Expression]:
-    with (files(__package__) / "expressions.csv").open(encoding="utf-8") as file:
-        rows = {row["name"]: row for row in csv.DictReader(file)}
+    rows = {row["name"]: row for row in packaged_rows(__package__, "expressions.csv")}
     drawn = _drawn_faps()
     result: dict[str, Expression] = {}
     for mixed in (False, True):  # recipes name expressions that are drawn
@@ -78,12 +75,11 @@ def _by_any_name() -> dict[str, Expression]:
 def _drawn_faps() -> dict[str, Float32]:
     values: dict[str, Float32] = {}
     listed: dict[str, Bool] = {}
-    with (files(__package__) / "expression_faps.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            name, column = row["expression"], fap_numbers()[row["fap"]] - 1
-            values.setdefault(name, np.zeros(FAP_COUNT, dtype=np.float32))[column] = float(row["value"])
-            listed.setdefault(name, np.zeros(FAP_COUNT, dtype=bool))[column] = True
-    return {name: fill(row, listed[name])[0].astype(np.float32) for name, row in values.items()}
+    for row in packaged_rows(__package__, "expression_faps.csv"):
+        name, column = row["expression"], fap_numbers()[row["fap"]] - 1
+        values.setdefault(name, np.zeros(FAP_COUNT, dtype=np.float32))[column] = float(row["value"])
+        listed.setdefault(name, np.zeros(FAP_COUNT, dtype=bool))[column] = True
+    return {name: fill_from_mates(row, listed[name])[0].astype(np.float32) for name, row in values.items()}
 
 
 def _recipe(text: str) -> tuple[tuple[str, float], ...]:

@@ -13,10 +13,10 @@ from fba.arrays import UInt8
 from fba.parameters import FAP_COUNT
 from fba_player.gl._context import offscreen_context
 from fba_player.gl._framebuffer import Target
-from fba_player.gl.renderer import Renderer
+from fba_player.gl._renderer import Renderer
 from fba_player.scene.scene import Scene
+from fba_player.view._camera import Camera
 from fba_player.view._view import View
-from fba_player.view.camera import Camera
 from fba_player.view.protocols import Closing, Showable
 
 SAMPLES = 0

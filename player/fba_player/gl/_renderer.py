@@ -24,8 +24,8 @@ from fba_player.gl._resources import (
     write_buffer,
 )
 from fba_player.gl._silhouette import Outliner
+from fba_player.view._camera import Camera
 from fba_player.view._view import CAPSULE_FLOATS, Eye, Mesh, View
-from fba_player.view.camera import Camera
 
 MAX_BLOBS = 8
 """Largest number of soft shadows on the ground."""

@@ -4,23 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.capture.sampling import find_gaps
 from fba.errors import ModelError
+from fba.sampling import find_gaps
 from fba.tracks import freeze
 
-COUNTS = (68, 70, 468, 478)
-"""Numbers of points of known trackers: iBUG's 68 (dlib, OpenFace, 300-W), OpenPose's 70, MediaPipe's."""
-OTHER_TRACKERS = {
-    5: "RetinaFace and MTCNN", 17: "one half of a face's outline", 21: "AFLW", 29: "COFW", 49: "SDM",
-    51: "iBUG's 68 without the outline", 66: "IntraFace and CLM", 98: "WFLW", 106: "JD-landmark, InsightFace",
-    194: "HELEN", 543: "MediaPipe Holistic, a face of which is 468", 553: "MediaPipe Holistic",
-}  # fmt: skip
-"""Other numbers of points on a face, and who uses them."""
 MAX_COORDINATE = 1e7
 """Largest coordinate; more is damage."""
 
@@ -41,6 +33,16 @@ class PointMotion:
     Arrays are read-only copies. Raises ModelError if the parts contradict each other.
     """
 
+    COUNTS: ClassVar = (68, 70, 468, 478)
+    """Numbers of points of known trackers: iBUG's 68 (dlib, OpenFace, 300-W), OpenPose's 70, MediaPipe's."""
+    OTHER_TRACKERS: ClassVar = {
+        5: "RetinaFace and MTCNN", 17: "one half of a face's outline", 21: "AFLW", 29: "COFW", 49: "SDM",
+        51: "iBUG's 68 without the outline", 66: "IntraFace and CLM", 98: "WFLW",
+        106: "JD-landmark, InsightFace", 194: "HELEN", 543: "MediaPipe Holistic, a face of which is 468",
+        553: "MediaPipe Holistic",
+    }  # fmt: skip
+    """Other numbers of points on a face, and who uses them."""
+
     positions: Float64
     times: Float64
     rate: Fraction
@@ -60,7 +62,7 @@ class PointMotion:
                 f"PointMotion: positions (T, N, 2 or 3) and times (T,) do not fit: {positions.shape} and "
                 f"{times.shape}"
             )
-        check_count(positions.shape[1])
+        self.check_count(positions.shape[1])
         freeze(self, rate=Fraction(self.rate))
         if self.rate <= 0:
             raise ModelError(f"PointMotion: the rate must be positive, not {self.rate}")
@@ -114,14 +116,14 @@ class PointMotion:
             "findings": list(self.findings),
         }
 
-
-def check_count(count: int) -> None:
-    """Raise ModelError for a number of points that no known tracker finds."""
-    if count in COUNTS:
-        return
-    whose = f", as those of {OTHER_TRACKERS[count]}" if count in OTHER_TRACKERS else ""
-    known = ", ".join(map(str, COUNTS[:-1]))
-    raise ModelError(
-        f"{count} points on a face{whose}: nobody says here what each of them is; sets of {known} and "
-        f"{COUNTS[-1]} points are known (iBUG's 68, OpenPose's 70, MediaPipe's)"
-    )
+    @classmethod
+    def check_count(cls, count: int) -> None:
+        """Raise ModelError for a number of points that no known tracker finds."""
+        if count in cls.COUNTS:
+            return
+        whose = f", as those of {cls.OTHER_TRACKERS[count]}" if count in cls.OTHER_TRACKERS else ""
+        known = ", ".join(map(str, cls.COUNTS[:-1]))
+        raise ModelError(
+            f"{count} points on a face{whose}: nobody says here what each of them is; sets of {known} and "
+            f"{cls.COUNTS[-1]} points are known (iBUG's 68, OpenPose's 70, MediaPipe's)"
+        )

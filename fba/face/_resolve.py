@@ -18,8 +18,7 @@ from fba.arrays import Array, Bool, Float32, Float64, Int16, Int32, Intp
 from fba.face._expressions import Definitions
 from fba.face.interpolation._evaluate import estimate, evaluate
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.mates import fill
-from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps
+from fba.parameters import FAP_COUNT, INTENSITY_MAX, faps, fill_from_mates
 from fba.tracks import hold
 
 RESOLVED_AT_ONCE = 4096
@@ -70,7 +69,7 @@ def known_faps(track: FaceTrack) -> tuple[Int32, Bool]:
     if interpolated is not None:
         sent = sent & ~interpolated
         values = np.where(sent, values, np.int32(0))
-    filled, known = fill(values, sent)
+    filled, known = fill_from_mates(values, sent)
     known[:, :2] = False
     return filled.astype(np.int32, copy=False), known
 
@@ -146,8 +145,8 @@ class Resolver:
         if self._fit is not None:
             values, sent, from_high_level = evaluate(self._fit, values, sent, viseme, expression)
             # Values that the table derives from the expression must not have it added once more.
-            replaces = replaces | fill(from_high_level, sent)[0].astype(bool)
-        values, known = fill(values, sent)
+            replaces = replaces | fill_from_mates(from_high_level, sent)[0].astype(bool)
+        values, known = fill_from_mates(values, sent)
         shown: Float32 = values.astype(np.float32)
         high_level = self._visemes_shown(track, viseme) + self._expressions_shown(track, expression)
         if interpolated is not None:
@@ -276,7 +275,7 @@ def _redefine(
     if not len(events):
         return _DefinitionsInForce(table, None)
     mask = track.mask[events] & stored
-    new = fill(np.where(mask, track.values[events], 0), mask)[0].astype(np.float32)
+    new = fill_from_mates(np.where(mask, track.values[events], 0), mask)[0].astype(np.float32)
     rows = np.broadcast_to(np.arange(len(table)), (len(track), len(table))).copy()
     rows[events, select[events]] = len(table) + np.arange(len(events))
     return _DefinitionsInForce(np.concatenate([table, new]), np.maximum.accumulate(rows, axis=0))

@@ -22,12 +22,12 @@ from fba.choices import Axes
 from fba.errors import DisplayError
 from fba.rotations import unit
 from fba_player._mesh.primitives import sphere_mesh
-from fba_player.export.offscreen import follow_camera, looks_at_head
+from fba_player.export._offscreen import follow_camera, looks_at_head
 from fba_player.gl._context import missing_libraries, missing_text
 from fba_player.scene.scene import Scene
+from fba_player.view._camera import Camera
 from fba_player.view._geometry import transform, turn_partly
 from fba_player.view._view import Eye, FaceMesh, Mesh
-from fba_player.view.camera import Camera
 
 if TYPE_CHECKING:
     from fba.body import BodyModel

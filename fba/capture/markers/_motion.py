@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.capture.markers._gaps import find_gaps
+from fba.choices import FileUpAxis
 from fba.errors import ModelError
 from fba.tracks import freeze
 
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "dm": 0.1, "in": 0.0254, "ft": 0.3048}
-"""Units of length, in metres."""
-MAX_MARKERS = 2000
-"""Largest number of markers; more are damage. Captures of faces have hundreds, those of crowds a thousand."""
 MAX_COORDINATE = 1e6
 """Largest coordinate, metres; more is damage."""
 
@@ -35,12 +32,15 @@ class MarkerMotion:
     a coordinate is infinite or beyond a million metres.
     """
 
+    MAX_MARKERS: ClassVar = 2000
+    """More markers are damage. Captures of faces have hundreds of them, those of crowds a thousand."""
+
     names: tuple[str, ...]
     positions: Float64
     times: Float64
     rate: Fraction
     unit: str = ""
-    up: str = ""
+    up: FileUpAxis = ""
     name: str = ""
     start: float | None = None
 
@@ -53,8 +53,8 @@ class MarkerMotion:
                 f"MarkerMotion: {count} names need positions (T, {count}, 3) and times (T,), not "
                 f"{positions.shape} and {times.shape}"
             )
-        if not 0 < count <= MAX_MARKERS:
-            raise ModelError(f"a capture needs 1 to {MAX_MARKERS} markers, not {count}")
+        if not 0 < count <= self.MAX_MARKERS:
+            raise ModelError(f"a capture needs 1 to {self.MAX_MARKERS} markers, not {count}")
         if len(set(self.names)) != count:
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise ModelError(f"two markers are called {twice!r}")
@@ -120,8 +120,3 @@ class MarkerMotion:
     def duration(self) -> float:
         """Seconds from the first frame to the end of the last."""
         return float(self.times[-1] - self.times[0] + 1 / self.rate) if len(self) else 0.0
-
-
-def regular_times(count: int, rate: Fraction, first: float = 0.0) -> Float64:
-    """Return the times of frames at a constant rate: float64 (count,), seconds."""
-    return first + np.arange(count, dtype=np.float64) * np.float64(1 / rate)

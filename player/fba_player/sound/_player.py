@@ -20,7 +20,7 @@ from typing import Any
 from fba.atomic import PathLike
 from fba.errors import FbaWarning
 from fba_player.gl._context import cure
-from fba_player.playback.transport import Transport
+from fba_player.playback._transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
 from fba_player.sound.audio_file import CHANNELS, SoundFile

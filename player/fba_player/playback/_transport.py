@@ -11,7 +11,7 @@ import time as wall
 from collections.abc import Callable
 
 from fba_player.playback._playhead import Motion
-from fba_player.playback.timeline import clock_text, timecode
+from fba_player.playback._timeline import clock_text, timecode
 from fba_player.view.protocols import Times
 
 SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)

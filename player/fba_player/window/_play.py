@@ -22,11 +22,11 @@ from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
 from fba_player.session._source import Source
-from fba_player.view.camera import Camera
+from fba_player.view._camera import Camera
 from fba_player.window._window import WARNING_SECONDS, Window
 
 if TYPE_CHECKING:
-    from fba_player.sound.player import Audio
+    from fba_player.sound._player import Audio
     from fba_player.view.protocols import Showable
 
 Newest = Callable[[], tuple[FaceTrack | None, BodyTrack | None]]
@@ -102,7 +102,7 @@ def play(
 
 def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
     """Add a sound to the session; return None, with a notice, if there is no sound device."""
-    from fba_player.sound.player import open_audio
+    from fba_player.sound._player import open_audio
 
     session.audio = open_audio(path, session.transport, offset=offset)
     session.sound, session.sound_offset = path, offset

@@ -5,15 +5,14 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from fba.arrays import Float32
 from fba.parameters import EXPRESSIONS, FAP_COUNT
+from fba.text_files import packaged_rows
 
 FAMILIES = EXPRESSIONS[1:]
 """Names of the six families, which FAP 2 can show: joy, sadness, anger, fear, disgust, surprise."""
@@ -65,6 +64,5 @@ class Expression:
 @cache
 def whissel_points() -> dict[str, tuple[float, float]]:
     """Return (activation, evaluation) of each word in `whissel.csv`."""
-    with (files(__package__) / "whissel.csv").open(encoding="utf-8") as file:
-        rows = csv.DictReader(file)
-        return {row["word"]: (float(row["activation"]), float(row["evaluation"])) for row in rows}
+    rows = packaged_rows(__package__, "whissel.csv")
+    return {row["word"]: (float(row["activation"]), float(row["evaluation"])) for row in rows}

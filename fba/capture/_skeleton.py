@@ -26,12 +26,6 @@ from fba.errors import FbaWarning, ModelError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import BodyTrack
 
-MAX_FRAMES = 500_000
-"""Frames of the longest motion: more than an hour at 120 frames/s."""
-FRAME_BYTES = 2400
-"""Memory, in bytes, that retargeting takes for each frame."""
-JOINT_BYTES = 130
-"""Memory, in bytes, that retargeting takes for each joint of the source in a frame."""
 MIN_REST_COSINE = np.cos(np.radians(1.0))
 """Smallest cosine of the angle between a bone of a limb at rest and in the default posture."""
 MAX_SIZE_DIFFERENCE = 1e-4
@@ -142,14 +136,16 @@ def _check_frames(motion: SkeletonMotion, rate: Fraction, limits: Limits) -> Non
     if not len(motion):
         raise ModelError("the motion has no frames")
     frames = int((len(motion) - 1) * max(rate, Fraction(0)) / motion.rate) + 1  # checked before resampling
-    if frames > MAX_FRAMES:
+    if frames > motion.MAX_FRAMES:
         raise ModelError(
-            f"the motion has {frames} frames at {float(rate):g} frames/s, more than {MAX_FRAMES}; "
+            f"the motion has {frames} frames at {float(rate):g} frames/s, more than {motion.MAX_FRAMES}; "
             "cut it into pieces, or give a lower rate"
         )
     if frames > len(motion):
         source = motion.rotations.nbytes + motion.positions.nbytes
-        check_memory(limits, frames, len(motion.names), f"the motion at {float(rate):g} frames/s", source)
+        motion.check_memory(
+            limits, frames, len(motion.names), f"the motion at {float(rate):g} frames/s", source
+        )
 
 
 def solve_targets(
@@ -169,15 +165,6 @@ def solve_targets(
         return frames
 
     return solve_track(solver, turned, len(root), matrices, previous)
-
-
-def check_memory(limits: Limits, frames: int, joints: int, what: str, source: int) -> None:
-    """Raise LimitError if the retargeting of a motion would take more than the limits allow.
-
-    what: "the motion". source: bytes of the file, or the part of it, that the motion comes from.
-    """
-    limits.check_frames(frames, what)
-    limits.check_bytes(frames * (FRAME_BYTES + JOINT_BYTES * joints), what, source=source)
 
 
 def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32
-from fba.body.skeleton import Skeleton
+from fba.body._skeleton import Skeleton
 from fba.body.skin.skin_weights import checked_weights
 from fba.choices import SkinMethod
 from fba.errors import ModelError
