@@ -59,7 +59,7 @@ export function mutant(/** @type {Uint8Array[]} */ streams, /** @type {number} *
     () => { data.length = place(); },
     () => { const other = pick(streams); data = [...data.slice(0, place()), ...other.slice(below(other.length + 1))]; },
     () => word(pick(WORDS)), () => word(pick(WORDS)),
-    () => { const value = pick(NUMBERS); data.splice(place(), 4, value >>> 24, (value >>> 16) & 255, (value >>> 8) & 255, value & 255); },
+    () => { const value = pick(NUMBERS); data.splice(place(), 4, ...[24, 16, 8, 0].map((shift) => (value >>> shift) & 255)); },
   ];
   function flip() {
     const bit = below(8 * data.length);
@@ -101,8 +101,8 @@ function decodeAll(stream, number) {
       const animation = decode(stream, { salvage });
       for (let at = 0; at < animation.length; at += Math.ceil(animation.length / 50)) {
         const frame = animation.frame(at);
-        if (!Number.isFinite(frame.time) || !(frame.face || frame.body)) throw new Error(`frame ${at}: ${JSON.stringify(frame)}`);
-        if (at && animation.index[at] <= animation.index[at - 1]) throw new Error(`frame ${at} does not follow the one before it`);
+        const follows = at === 0 || animation.index[at] > animation.index[at - 1];
+        if (!follows || !Number.isFinite(frame.time) || !(frame.face || frame.body)) throw new Error(JSON.stringify(frame));
       }
       return animation.length;
     });
@@ -114,7 +114,9 @@ function decodeAll(stream, number) {
       for (let at = 0; at < stream.length; at += size) frames += decoder.push(stream.subarray(at, at + size)).length;
       return frames + decoder.finish().length;
     });
-    if (!salvage && whole !== null && pieces !== whole) throw new Error(`${whole} frames whole, ${pieces} in pieces of ${size} bytes`);
+    if (!salvage && whole !== null && pieces !== whole) {
+      throw new Error(`${whole} frames whole, ${pieces} in pieces of ${size} bytes`);
+    }
   }
 }
 

@@ -1,13 +1,15 @@
 /** Decode a stream to the text of values that `fba conformance` compares: node conformance.mjs IN OUT [iso|visage]. */
 import { readFileSync, writeFileSync } from "node:fs";
-import { Decoder, FbaError } from "./fba.js";
+import { Decoder, FbaError, decode } from "./fba.js";
 
-const [input, output, bapSteps] = process.argv.slice(2);
+const [input, output, named] = process.argv.slice(2);
+const data = readFileSync(input);
 const lines = ["fba-values 1"];
-const decoder = new Decoder({ bapSteps: /** @type {"iso" | "visage" | undefined} */ (bapSteps) });
+const bapSteps = /** @type {"iso" | "visage" | undefined} */ (named) ?? marked();
+const decoder = new Decoder({ bapSteps });
 let status = 0;
 try {
-  for (const frame of decoder.push(readFileSync(input))) addPlane(frame);
+  for (const frame of decoder.push(data)) addPlane(frame);
   for (const frame of decoder.finish()) addPlane(frame);
 } catch (error) {
   if (!(error instanceof FbaError)) throw error;
@@ -17,6 +19,15 @@ try {
 }
 writeFileSync(output, [...lines, "end", ""].join("\n"));
 process.exitCode = status;
+
+/** Return the table of BAP steps that the stream names, which may stand behind its end. */
+function marked() {
+  try {
+    return decode(data, { salvage: true }).mark ?? undefined;
+  } catch {
+    return undefined;
+  }
+}
 
 /** @param {import("./decoder/frames.js").StreamFrame} frame */
 function addPlane({ time, face, body }) {

@@ -2,3 +2,10 @@
 export { Animation, decode } from "./decoder/animation.js";
 export { FbaError } from "./decoder/errors.js";
 export { Decoder } from "./decoder/stream.js";
+
+/** @typedef {import("./decoder/stream.js").Options} Options */
+/** @typedef {import("./decoder/frames.js").Frame} Frame */
+/** @typedef {import("./decoder/frames.js").StreamFrame} StreamFrame */
+/** @typedef {import("./decoder/frames.js").FaceFrame} FaceFrame */
+/** @typedef {import("./decoder/frames.js").BodyFrame} BodyFrame */
+/** @typedef {import("./decoder/damage.js").Damage} Damage */

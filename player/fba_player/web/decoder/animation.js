@@ -26,7 +26,8 @@ export class Animation {
     /** What was lost, when salvaging. */
     this.damage = decoder.damage;
     if (!planes.length) {
-      throw new FbaError("damage", "the stream holds no plane that can be decoded", 0, undefined, this.damage[0]?.error.message ?? "");
+      const cause = this.damage[0]?.error.message ?? "";
+      throw new FbaError("damage", "the stream holds no plane that can be decoded", 0, undefined, cause);
     }
     /** What is odd in the stream. */
     this.warnings = decoder.warnings;
@@ -51,7 +52,7 @@ export class Animation {
 
   /** Return the seconds at which a frame is shown. @param {number} at */
   time(at) {
-    return this.index[at] / this.rate.valueOf();
+    return (this.index[at] * Number(this.rate.denominator)) / Number(this.rate.numerator);
   }
 
   /** Return a frame. @param {number} at from 0 @returns {import("./frames.js").Frame} */

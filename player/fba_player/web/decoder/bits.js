@@ -37,7 +37,9 @@ export class Bits {
     const stop = this._bit + count;
     if (stop > this._end) throw OUT_OF_DATA;
     let value = 0;
-    for (; this._bit < stop; this._bit += 1) value = 2 * value + ((this._data[this._bit >> 3] >> (7 - (this._bit & 7))) & 1);
+    for (; this._bit < stop; this._bit += 1) {
+      value = 2 * value + ((this._data[this._bit >> 3] >> (7 - (this._bit & 7))) & 1);
+    }
     return value;
   }
 

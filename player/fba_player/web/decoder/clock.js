@@ -125,7 +125,8 @@ export class Clock {
       };
       if (behindLoss) log._resume(jump === null ? lost : [Math.max(jump, 0), 0]);
       else if (moved < 0 || (agreed && moved)) {
-        report(`time code ${code?.text}: ${moved > 0 ? "frames missing" : "planes too many"} before it: ${Math.abs(moved)}`, Math.max(moved, 0));
+        const what = moved > 0 ? "frames missing" : "frames too many";
+        report(`time code ${code?.text}: ${what} before it: ${Math.abs(moved)}`, Math.max(moved, 0));
       }
       if (refused.length) report(refused[refused.length - 1]);
     }
@@ -204,7 +205,8 @@ class RestartPoints {
 
   /** Return the expected restart point nearest to an index; NaN where they are irregular. @param {number} index */
   _nearest(index) {
-    return this._upcoming(index).reduce((best, point) => (Math.abs(point - index) >= Math.abs(best - index) ? best : point), NaN);
+    const distance = (/** @type {number} */ point) => Math.abs(point - index);
+    return this._upcoming(index).reduce((best, point) => (distance(point) >= distance(best) ? best : point), NaN);
   }
 
   /** Return the intervals that repeat, beginning with the next. */

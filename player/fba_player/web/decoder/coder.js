@@ -150,8 +150,9 @@ export function decodeSegment(bits, models, slots, first, stop, adaptive, symbol
     throw new Fault(`22 zero bits are followed by another 0, expected 1${DAMAGED}`, badGuard);
   }
   const after = bit - 14 - Number(guardAt >= used);
-  if (after > end || (code >> 14 !== (low < QUARTER ? 1 : 2) && bit > end)) throw OUT_OF_DATA; // with bits missing, a wrong close need not be damage
-  if (code >> 14 !== (low < QUARTER ? 1 : 2)) {
+  const closed = code >> 14 === (low < QUARTER ? 1 : 2);
+  if (after > end || (!closed && bit > end)) throw OUT_OF_DATA; // with bits missing, it need not be damage
+  if (!closed) {
     throw new Fault(`no bits that close the arithmetic segment stand at its end${DAMAGED}`, after - 2);
   }
   bits._bit = after;

@@ -36,5 +36,6 @@ export function partsOf({ face, body, row }) {
 export function streamFrame(plane) {
   const { index, span, number, bit, stop, intra, doubtful } = plane;
   const time = span._time(index).valueOf();
-  return { index, time, ...partsOf(plane), plane: number, bit, bits: stop - bit, intra, doubtful, rate: span._rate.valueOf() };
+  const [bits, rate] = [stop - bit, span._rate.valueOf()];
+  return { index, time, ...partsOf(plane), plane: number, bit, bits, intra, doubtful, rate };
 }

@@ -56,10 +56,13 @@ export function stepOf(slot, quant, table) {
   return STEPS[parseInt(BAP_STEPS[table][slot - FIRST_BAP] ?? "0", 36)] * scaleOf(BODY, quant);
 }
 
-/** The lowest value that each slot may have. */
-export const LOWEST = Int32Array.from({ length: SLOTS }, (_, slot) => (slot >= FIRST_FAP ? -(2 ** 31) : isAmount(slot) ? -HIGHEST_AMOUNT : 0));
-/** The highest value that each slot may have. */
-export const HIGHEST = Int32Array.from({ length: SLOTS }, (_, slot) => (slot >= FIRST_FAP ? 2 ** 31 - 1 : SELECT_LIMITS[slot] || HIGHEST_AMOUNT));
+/** The lowest value that each slot may have, and the highest. */
+export const LOWEST = new Int32Array(SLOTS).fill(-(2 ** 31));
+export const HIGHEST = new Int32Array(SLOTS).fill(2 ** 31 - 1);
+for (let slot = 0; slot < FIRST_FAP; slot += 1) {
+  LOWEST[slot] = isAmount(slot) ? -HIGHEST_AMOUNT : 0;
+  HIGHEST[slot] = SELECT_LIMITS[slot] || HIGHEST_AMOUNT;
+}
 
 /** Default ranges as magnitudes, of all slots I max, I min, P max, P min; NaN for extension BAPs, which have none. */
 export const DEFAULT_LIMITS = [0, 1, 2, 3].map((list) =>

@@ -3,7 +3,8 @@ import { Fault } from "./bits.js";
 import { DAMAGED, Model, decodeSegment } from "./coder.js";
 import { Fraction } from "./fraction.js";
 import {
-  BASE, BODY, COLUMNS, DEFAULT_LIMITS, FACE, FIRST_BAP, FIRST_FAP, GROUPS, HIGHEST, LOWEST, RANGE_UNIT, SLOTS, amountLimit, label, scaleOf, stepOf,
+  BASE, BODY, COLUMNS, DEFAULT_LIMITS, FACE, FIRST_BAP, FIRST_FAP, GROUPS, HIGHEST, LOWEST, RANGE_UNIT, SLOTS,
+  amountLimit, label, scaleOf, stepOf,
 } from "./parameters.js";
 
 /** @typedef {import("./bits.js").Bits} Bits */
@@ -135,7 +136,8 @@ export class PlaneReader {
       const type = bits._read(3) - 4; // 0 none, 1 masked, 2 masked and the others interpolated, 3 all
       if (type < 0) throw markerFault(`before the mask type of group ${number + 1} of ${NAMES[part]}`, bits._bit - 3);
       if (type === 2 && part === BODY) {
-        throw new Fault(`the mask type of group ${number + 1} of BAPs is 2 (interpolate), which only FAPs have`, bits._bit - 2);
+        const finding = `the mask type of group ${number + 1} of BAPs is 2 (interpolate), which only FAPs have`;
+        throw new Fault(finding, bits._bit - 2);
       }
       for (const column of group) {
         mask[column] = type % 3 ? bits._read(1) : Number(type === 3);
@@ -143,7 +145,8 @@ export class PlaneReader {
       }
     });
     if (bits._read(2) & 1) { // the bit before it is the gender
-      throw new Fault(`${NAMES[part]} are coded as DCT segments, whose tables are in no public source`, bits._bit - 1, "unsupported");
+      const finding = `${NAMES[part]} are coded as DCT segments, whose tables are in no public source`;
+      throw new Fault(finding, bits._bit - 1, "unsupported");
     }
     const sent = bits._read(4);
     const ranges = LISTS.map((list, number) => {
@@ -152,7 +155,8 @@ export class PlaneReader {
       if (sent & (8 >> number)) {
         for (const group of groups.slice(Number(part === FACE))) { // FAP 1 and 2 have no ranges
           group.forEach((column, member) => {
-            if (member % MARKER_EVERY === 0 && !bits._read(1)) throw markerFault(`in the ${list} range list`, bits._bit - 1);
+            const marked = member % MARKER_EVERY > 0 || bits._read(1);
+            if (!marked) throw markerFault(`in the ${list} range list`, bits._bit - 1);
             if (mask[column]) codes.push([BASE[part] + column, bits._read(5)]);
           });
         }
@@ -181,7 +185,9 @@ export class PlaneReader {
       this._minimum[1][slot] = -iMin;
       this._step[slot] = stepOf(slot, quant, this._table);
     }
-    if (lacking < SLOTS) throw new Fault(`${label(lacking)} is sent, but no range for it, and it has no default`, bits._bit);
+    if (lacking < SLOTS) {
+      throw new Fault(`${label(lacking)} is sent, but no range for it, and it has no default`, bits._bit);
+    }
     return settings;
   }
 }

@@ -182,7 +182,7 @@ export class Decoder {
     this._retryAt = Math.max(this._retryAt - needed, 0);
   }
 
-  // ---- states: each returns a block, undefined without one, or null where it needs more bytes
+  // ---- states: each returns a plane, undefined without one, or null where it needs more bytes
 
   /** Look for the object start code; headers of other layers may come before it. @param {boolean} final @returns {StreamPlane | null | undefined} */
   _findObject(final) {
@@ -208,11 +208,8 @@ export class Decoder {
       this._compareChecks();
       if (OBJECT_CODES.includes(code)) {
         if (this._startError && this._objects._count === 0) this._log._add(this._startError, 0, this._offset + at);
-        this._bit = 8 * this._scanned;
-        this._scanned = 0;
         this._beginObject(this._offset + at);
-        this._state = this._decodePlanes;
-        return undefined;
+        return this._goOn(at + 4);
       }
     }
     if (!final) this._bit = Math.max(this._bit, 8 * this._scanned);
@@ -230,7 +227,8 @@ export class Decoder {
     const head = this._data.subarray(0, Math.min(this._length, 4));
     const begins = [0, 0, 1].every((byte, place) => place >= head.length || head[place] === byte);
     if (begins && !(final && head.length < 4)) return;
-    this._startError = new FbaError("damage", `${NO_START}: the stream begins with ${[...head].map(hex).join(" ") || "nothing"}`, 0, 0);
+    const found = [...head].map(hex).join(" ") || "nothing";
+    this._startError = new FbaError("damage", `${NO_START}: the stream begins with ${found}`, 0, 0);
     if (!this._salvage) throw this._startError;
   }
 
@@ -264,12 +262,17 @@ export class Decoder {
 
   /** Begin at an I plane of an object whose start is missing. @param {number} at byte of its start code @returns {undefined} */
   _join(at) {
-    const error = this._startError ?? new FbaError("damage", NO_START, 0, 0);
+    this._startError ??= new FbaError("damage", NO_START, 0, 0);
     this._beginObject(this._offset + at);
     this._reader._forgetValues();
     this._checks._abandon();
-    this._log._add(error, 0, this._offset + at);
-    this._bit = 8 * at;
+    this._log._add(this._startError, 0, this._offset + at);
+    this._goOn(at);
+  }
+
+  /** Decode planes from a byte in the buffer on. @param {number} byte @returns {undefined} */
+  _goOn(byte) {
+    this._bit = 8 * byte;
     this._scanned = 0;
     this._state = this._decodePlanes;
   }
@@ -353,10 +356,7 @@ export class Decoder {
       if (!wanted || at + 4 >= this._length) continue;
       if (PLANE_CODES.includes(code) && !(this._data[at + 4] & 0x80)) continue; // the planes that it depends on are lost
       this._log._end(this._offset + at);
-      this._bit = 8 * at;
-      this._scanned = 0;
-      this._state = this._decodePlanes;
-      return undefined;
+      return this._goOn(at);
     }
     this._scanned = Math.max(this._scanned, this._length - 3);
     this._bit = 8 * this._scanned;
