@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from fba import persona as persona
     from fba import planning as planning
     from fba import player as player
+    from fba import serving as serving
     from fba.animation import Animation, BodyTrack, FaceTrack, Frame
     from fba.codec import Decoder, Encoder, StreamInfo, decode
     from fba.encoder_options import EncoderOptions
@@ -59,7 +60,7 @@ _NAMES = {
 """Public names by the module that they are imported from."""
 _MODULES = (
     "body", "capture", "codec", "emotion", "face", "formats", "live", "parameters", "persona", "planning",
-    "player",
+    "player", "serving",
 )  # fmt: skip
 
 __all__ = [

@@ -62,6 +62,8 @@ ILLUSTRATIONS = {
     ("docs/capture-live.md", "fba capture livelink -o face.fba"): SENT,
     ("docs/capture-live.md", "fba capture livelink -o face.fba --bitrate 3000 --buffer 1s"): SENT,
     ("docs/capture-live.md", "fba capture livelink -o - | fba play -"): WINDOW,
+    ("docs/capture-live.md", "fba capture livelink --serve 8080 -o face.fba"): SENT,
+    ("docs/capture-live.md", "fba serve hello.fba --loop"): "serves until somebody ends it",
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "./dev bounds"): "takes hours; .ci/run runs a part, tests/fuzz the command",

@@ -18,6 +18,8 @@ _STUFFING = b"\x7f"
 _CHUNK = 1 << 16
 _MOST_UNREAD = 1 << 20
 """Bytes that are kept while no plane comes: many times a plane."""
+_FIRST_CODE = 2.0
+"""Seconds of an object without a time code after which none is expected."""
 _READ_AGAIN = 1 << 16
 """Bytes of the last planes that are kept: at damage, decoding may go on in one of them."""
 
@@ -57,7 +59,7 @@ class PlaneSplitter:
         self._end = 0  # bit of the stream behind the last plane
         self._configuration = b""
         self._fault: FbaError | None = None  # the first
-        self._state = _State()
+        self._state = _State(0.0)
 
     def push(self, chunk: bytes) -> list[Plane]:
         """Add bytes; return the planes that they complete. Raises LimitError."""
@@ -93,13 +95,14 @@ class PlaneSplitter:
         fresh = start != self._end or not self.planes
         begins = fresh and (not self.planes or any(code in gap for code in _OBJECTS))
         if begins:
-            self._state = _State()
+            self._state = _State(times[0])
             named = self._bap_steps or self._decoder.mark
             opening = b"".join(write_opening(table) for table in BAP_STEP_TABLES if table == named)
             self._configuration = opening + _OBJECT
         if fresh:
             self._end = start
-        joinable = self._state.renewed_by(block.settings) and (begins or block.settings.start_code)
+        renewed = self._state.renewed_by(block.settings, times[0])
+        joinable = begins or (renewed and block.settings.start_code)
         planes: list[Plane] = []
         for time, end in zip(times, borders[1:], strict=True):
             data = self._bytes(self._end, end)
@@ -120,23 +123,32 @@ class PlaneSplitter:
 
 
 class _State:
-    """What the I planes of an object have set so far, and stays in force until others set it anew."""
+    """What the I planes of an object have set so far, and stays in force until others set it anew.
 
-    def __init__(self) -> None:
+    begun: seconds at which the object begins.
+    """
+
+    def __init__(self, begun: float) -> None:
+        self._begun = begun
         self._set: set[str] = set()
 
-    def renewed_by(self, settings: PlaneSettings) -> bool:
-        """Whether a plane sets all of it again, so that a decoder can begin there."""
+    def renewed_by(self, settings: PlaneSettings, time: float) -> bool:
+        """Whether a plane, at so many seconds, sets all of it again, so that a decoder can begin there.
+
+        A decoder that begins without a time code would be set to another time by the next.
+        """
         if not settings.intra:
             return False
         sets = {"rate"} if settings.frame_rate is not None else set()
+        if settings.time_code is not None:
+            sets.add("time")
         for name, part in (("face", settings.face), ("body", settings.body)):
             if part is not None:
                 sent = (f"{name}.{number}" for number, codes in enumerate(part.ranges) if codes is not None)
                 sets |= {name, *sent}
         missing = self._set - sets
         self._set |= sets
-        return not missing
+        return not missing and ("time" in sets or time - self._begun >= _FIRST_CODE)
 
 
 def split_stream(

@@ -9,9 +9,12 @@ from typing import Any
 
 import pytest
 
+from fba.codec import encode_animation
+from fba.errors import BitstreamError
 from fba.serving import Plane, PlaneSplitter, show_file, show_pipe
 from fba.serving._channel import MOST_KEPT, MOST_UNSENT, Channel
 from fba.serving._pacing import LEAD, LONGEST_PAUSE, paced
+from joinable_streams import JOINABLE, performance
 
 
 class Net:
@@ -155,11 +158,6 @@ def test_pacing() -> None:
 
 
 def test_a_pipe_is_shown_as_it_comes() -> None:
-    from test_planes import JOINABLE, performance
-
-    from fba.codec import encode_animation
-    from fba.errors import BitstreamError
-
     data = encode_animation(performance(), JOINABLE)[0]
     pieces = [data[at : at + 100] for at in range(0, len(data), 100)]
     stage, splitter = FakeStage(), PlaneSplitter("visage")
