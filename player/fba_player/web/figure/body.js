@@ -36,7 +36,7 @@ export class Solver {
   pose(baps, result) {
     for (let joint = 0, at = 0; joint < this.parents.length; joint += 1, at += 16) {
       const up = 16 * this.parents[joint];
-      const [x, y, z] = this._offsets.subarray(3 * joint, 3 * joint + 3);
+      const x = this._offsets[3 * joint], y = this._offsets[3 * joint + 1], z = this._offsets[3 * joint + 2]; // prettier-ignore
       if (up < 0) {
         result.set(IDENTITY, at);
         [x, y, z].forEach((place, axis) => (result[at + 12 + axis] = place + this._shift[axis][1] * baps[this._shift[axis][0]]));
@@ -92,8 +92,9 @@ export class Body {
     this._surface = new Float32Array(this._rest.length);
     this._shadings = this.parts.map(({ positions, triangles, count: size, first }) => {
       const shading = new Shading(triangles, positions, new Uint8Array(size).fill(1));
-      this._surface.set(shading.rest, 3 * first);
-      return shading;
+      const surface = this._surface.subarray(3 * first, 3 * (first + size));
+      surface.set(shading.rest);
+      return { shading, positions, surface };
     });
     /** What the normals as modelled are besides those of the triangles. */
     this._besides = modelled.map((number, at) => number - this._surface[at]);
@@ -134,7 +135,7 @@ export class Body {
     }
     this._turnHead(headMatrix);
     this._skin.apply(joints, this._rest, this._besides, this.positions, this.normals);
-    this.parts.forEach(({ first, count, positions }, at) => this._shadings[at].update(positions, this._surface.subarray(3 * first, 3 * (first + count))));
+    for (const { shading, positions, surface } of this._shadings) shading.update(positions, surface);
     for (let at = 0; at < this.normals.length; at += 1) this.normals[at] += this._surface[at];
     normalise(this.normals, this.normals);
   }

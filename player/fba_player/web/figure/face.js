@@ -134,12 +134,13 @@ export class Face {
    */
   place(positions, normals, { bend = true, withHead = true } = {}) {
     const [x, y, z] = turnVector(this.headMatrix);
+    const bends = withHead && bend && (x !== 0 || y !== 0 || z !== 0);
     for (let number = 0; number < this.parts.length; number += 1) {
       const { first, count } = this.parts[number];
       const stop = first + count;
       for (let start = first, next = first; start < stop; start = next) {
-        const share = withHead && bend ? this._sway[start] : 1;
-        while (next < stop && (this._sway[next] === share || !withHead || !bend)) next += 1;
+        const share = bends ? this._sway[start] : 1;
+        while (next < stop && (!bends || this._sway[next] === share)) next += 1;
         if (share < 1) rotate(this._bent, x * share, y * share, z * share, this.centre);
         multiply(!withHead ? IDENTITY : share < 1 ? this._bent : this.headMatrix, this.partMatrices[number], this._combined);
         put(this._combined, this.positions, positions, 3 * start, 3 * next, 1);
@@ -198,7 +199,8 @@ function readTransforms(header, parts) {
  * @param {Float64Array} matrix @param {Float32Array} from @param {Float32Array} to @param {number} start @param {number} stop @param {number} shift 1 for points, 0 for directions
  */
 function put(matrix, from, to, start, stop, shift) {
-  const [a, b, c, , d, e, f, , g, h, i, , j, k, l] = matrix;
+  const a = matrix[0], b = matrix[1], c = matrix[2], d = matrix[4], e = matrix[5], f = matrix[6]; // prettier-ignore
+  const g = matrix[8], h = matrix[9], i = matrix[10], j = matrix[12], k = matrix[13], l = matrix[14]; // prettier-ignore
   for (let at = start; at < stop; at += 3) {
     const x = from[at];
     const y = from[at + 1];

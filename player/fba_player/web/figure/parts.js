@@ -143,9 +143,10 @@ export class Shading {
       const z = sums[from + 2];
       const length = Math.sqrt(x * x + y * y + z * z);
       const still = !(length > 1e-15);
-      normals[to] = still ? rest[to] : x / length;
-      normals[to + 1] = still ? rest[to + 1] : y / length;
-      normals[to + 2] = still ? rest[to + 2] : z / length;
+      const scale = 1 / length;
+      normals[to] = still ? rest[to] : x * scale;
+      normals[to + 1] = still ? rest[to + 1] : y * scale;
+      normals[to + 2] = still ? rest[to + 2] : z * scale;
     }
   }
 }
@@ -173,12 +174,18 @@ function sum(triangles, corners, positions, sums) {
     const nx = uy * vz - uz * vy;
     const ny = uz * vx - ux * vz;
     const nz = ux * vy - uy * vx;
-    for (let corner = at; corner < at + 3; corner += 1) {
-      const to = 3 * corners[corner];
-      sums[to] += nx;
-      sums[to + 1] += ny;
-      sums[to + 2] += nz;
-    }
+    const i = 3 * corners[at];
+    const j = 3 * corners[at + 1];
+    const k = 3 * corners[at + 2];
+    sums[i] += nx;
+    sums[i + 1] += ny;
+    sums[i + 2] += nz;
+    sums[j] += nx;
+    sums[j + 1] += ny;
+    sums[j + 2] += nz;
+    sums[k] += nx;
+    sums[k + 1] += ny;
+    sums[k + 2] += nz;
   }
 }
 
