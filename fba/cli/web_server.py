@@ -20,7 +20,7 @@ INTRA_PERIOD = 2
 
 
 def make_page(titles: Sequence[str]) -> bytes:
-    """Return the page that shows streams with these titles: faces on the built-in head, bodies as a person."""
+    """Return the page that shows streams with these titles: faces as a head, bodies as a person."""
     from fba_player.export.page import make_page
 
     return make_page([], with_body=True, live=True, title=" | ".join(titles)).encode()

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from fba.capture import shape_faps
 from fba.capture.blendshapes._inversion import SHARED_WEIGHT, _metres
 from fba.capture.blendshapes.combination import CLOSED, JAW
-from fba.capture.blendshapes.shape_table import ARKIT_ORDER, amounts_of
-from fba.face import FaceModel
+from fba.face import FaceModel, arkit_names
 from fba.parameters import EXPRESSIONS, VISEMES, baps, faps
 
 WEB = Path(__file__).parents[2] / "player" / "fba_player" / "web"
@@ -34,11 +34,11 @@ def make_names() -> str:
 def make_shapes() -> str:
     """Return the module of ARKit's shapes."""
     rows = {}
-    for name in ARKIT_ORDER:
-        amounts = amounts_of(name)
+    for name in arkit_names():
+        amounts = shape_faps(name)
         assert amounts is not None
         rows[name] = {int(column) + 1: float(amounts[column]) for column in np.flatnonzero(amounts)}
-    metres = [float(f"{metre:.6g}") for metre in _metres(ARKIT_ORDER)]
+    metres = [float(f"{metre:.6g}") for metre in _metres(arkit_names())]
     return "\n".join(
         [
             "/** ARKit's 52 shapes as FAPs, made by tools/web/make_page_tables.py. */",

@@ -10,8 +10,15 @@ import numpy as np
 from fba.codec._plane.coder_state import default_limits
 from fba.codec._plane.slots import BAPS, FAPS
 from fba.codec.settings import RANGE_UNIT
-from fba.face.mates import donors
-from fba.parameters import BAP_STANDARD_COUNT, BAP_STEP_TABLES, bap_groups, bap_steps, fap_groups, fap_steps
+from fba.parameters import (
+    BAP_STANDARD_COUNT,
+    BAP_STEP_TABLES,
+    bap_groups,
+    bap_steps,
+    fap_groups,
+    fap_steps,
+    mate_columns,
+)
 
 WEB = Path(__file__).parents[2] / "player" / "fba_player" / "web"
 TARGET = WEB / "decoder" / "tables.js"
@@ -52,7 +59,7 @@ def make_tables() -> str:
 
 def make_figure_tables() -> str:
     """Return the JavaScript module of the figure."""
-    columns = ",\n  ".join(str(column.tolist()) for column in donors())
+    columns = ",\n  ".join(str(column.tolist()) for column in mate_columns())
     return (
         "/** Tables of ISO/IEC 14496-2, made by tools/web/make_tables.py. */\n"
         "/** Columns of the FAPs that each FAP copies: its mate, its lip mate, and the mate of that. */\n"

@@ -135,8 +135,7 @@ def animation_page(animation: Animation, **options: Any) -> str:
     """Return a page that plays an animation. options: as for `make_page`."""
     from fba.codec import encode_animation
 
-    encoded = encode_animation(animation)
-    stream = PageStream(animation.name or "animation", encoded.data)
+    stream = PageStream(animation.name or "animation", encode_animation(animation)[0])
     with_body = animation.body is not None
     return make_page([stream], with_body=with_body, with_head=not with_body, **options)
 

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Int64
-from fba.body import BodyModel
+from fba.body import SIDES, AttachedHead, BodyModel, Skeleton
 from fba.body.footing import SOLE, has_feet
-from fba.body.head_attachment import AttachedHead, skull_of
-from fba.body.skeleton import SIDES, Skeleton
+from fba.body.head_attachment import skull_of
 from fba.body.solve.conventions import convention
 from fba_player._figure.body_light import UNOBSTRUCTED_LIGHT
 from fba_player._figure.person import Person, head_middle

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fba.arrays import Float64, Int32, Int64
-from fba.body.model import BodyPart
+from fba.body import BodyPart
 from fba.face import FaceDefMesh, FaceModel, InterpolationTable, Part, Term, feature_point_names
 from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
 from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, faps
