@@ -6,7 +6,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -160,12 +160,15 @@ def main(arguments: list[str] | None = None) -> None:
     except (KeyboardInterrupt, click.Abort):
         _exit_interrupted(interruptions.exit_code)
     except _OutputClosedError:
-        # Without an output, Python does not complain again while it shuts down.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         sys.exit(0)
     except (FbaError, OSError, MemoryError) as error:
         if debug:
             raise
+        try:
+            sys.stdout.flush()
+        except (OSError, ValueError, AttributeError):  # full, closed, or none
+            _drop_output()
         click.echo(f"fba: error: {with_program(_one_line(error), program, _COMMANDS)}", err=True)
         sys.exit(BAD_DATA)
     except Exception as error:
@@ -180,6 +183,12 @@ def main(arguments: list[str] | None = None) -> None:
         )
         sys.exit(BAD_DATA)
     sys.exit(result if isinstance(result, int) else 0)
+
+
+def _drop_output() -> None:
+    """Let what is left for standard output go nowhere: Python would complain of it, and exit with 120."""
+    with suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _exit_interrupted(code: int) -> NoReturn:
