@@ -19,7 +19,7 @@ import fba
 from fba.animation import Animation
 from fba.capture.live import widest_faces
 from fba.codec import write_opening
-from fba.errors import FormatError
+from fba.errors import FbaError, FormatError
 from fba.live import StreamFile, StreamRecorder
 from fba.live.recording import StreamPipe
 from fba.tracks import BodyTrack, FaceTrack
