@@ -56,7 +56,7 @@ Chosen = tuple[Part | BodyPart, Int32, int, FaceShape | None]
 
 
 def reduce_parts(container: Container, parts: Iterable[Chosen], groups: Integer | None = None) -> Reduced:
-    """Pack parts of a figure with the vertices of their triangles. groups: (V,), see `Deformer.normal_groups`."""
+    """Pack parts of a figure with the vertices of their triangles. groups: see `Deformer.normal_groups`."""
     rows, header = [np.zeros(0, dtype=np.int64)], list[dict[str, Any]]()
     for part, triangles, start, shape in parts:
         ordered = order_triangles(triangles)
