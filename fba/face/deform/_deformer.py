@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float32, Float64, Int64
+from fba.arrays import Float32, Float64, Int64, UInt32
 from fba.errors import RangeError
 from fba.face.deform._normals import Surface, build_surface
 from fba.face.deform.flat_tables import (
@@ -105,6 +105,11 @@ class Deformer:
         self._tables = _flat_model(model)
         self._scratch = loops.allocate_scratch(len(model.vertices), len(model.parts))
         self._lock = threading.Lock()
+
+    @property
+    def normal_groups(self) -> UInt32:
+        """uint32 (V,): equal for vertices that share a normal, as those along the seam of a texture do."""
+        return self._tables.surface.sum_of
 
     def __call__(
         self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Float64, Int32, Int64
+from fba.arrays import Float64, Int32, Int64, Integer
 from fba.body import BodyPart
 from fba.face import FaceDefMesh, FaceModel, InterpolationTable, Part, Term, feature_point_names
 from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
@@ -57,11 +57,11 @@ class Reduced:
 
 
 Chosen = tuple[Part | BodyPart, Int32, int, FaceShape | None]
-"""A part, its triangles (F, 3) that are shown, its first vertex in the model, its shape (not of eyeballs)."""
+"""A part, its triangles (F, 3), its first vertex in the model, and its shape; None for an eyeball."""
 
 
-def reduce_parts(container: Container, parts: Iterable[Chosen]) -> Reduced:
-    """Pack parts of a figure with the vertices of their triangles."""
+def reduce_parts(container: Container, parts: Iterable[Chosen], groups: Integer | None = None) -> Reduced:
+    """Pack parts of a figure with the vertices of their triangles. groups: see `Deformer.normal_groups`."""
     rows, header = [np.zeros(0, dtype=np.int64)], list[dict[str, Any]]()
     for part, triangles, start, shape in parts:
         ordered = order_triangles(triangles)
@@ -78,6 +78,9 @@ def reduce_parts(container: Container, parts: Iterable[Chosen]) -> Reduced:
             **_pack_surface(container, part, chosen, shape),
         }
         rows.append(chosen + start)
+        if groups is not None:  # how far before each vertex the first is that shares its normal
+            _, leaders, shared = np.unique(groups[rows[-1]], return_index=True, return_inverse=True)
+            entry["seams"] = container.add_integers(np.arange(len(chosen)) - leaders[shared])
         header.append(entry)
     return Reduced(np.concatenate(rows), header)
 
@@ -178,7 +181,7 @@ def pack_face_parts(
 ) -> tuple[dict[str, Any], Int64]:
     """Return the header of a face, and the vertices of its model that stay, in their new order."""
     model, size = figure.model, figure.scale
-    reduced = reduce_parts(container, parts)
+    reduced = reduce_parts(container, parts, figure.deformer.normal_groups)
     subject = figure.subject
     places = {part["name"]: place for place, part in enumerate(reduced.header)}
     number = {int(row): place for place, row in enumerate(reduced.rows)}

@@ -60,6 +60,8 @@ LINKS = (
 )
 FRAMES = 3
 FAP_ERROR, VERTEX_ERROR, JOINT_ERROR = 1.0, 1e-4, np.radians(0.01)
+NORMAL_ERROR = 0.35
+"""Radians; fewer triangles have somewhat other normals, most of all in the wildest grimaces."""
 PROGRAM = str(Path(__file__).with_name("show_figure.mjs"))
 COARSE = 0.0016
 """Detail (m) of figures whose vertices do not matter."""
@@ -193,6 +195,7 @@ def _check(errors: Errors) -> None:
     assert errors.vertices <= VERTEX_ERROR
     assert errors.turn <= JOINT_ERROR
     assert errors.joints <= VERTEX_ERROR
+    assert errors.normals <= NORMAL_ERROR
 
 
 def compare(

@@ -90,11 +90,11 @@ export class Body {
     const modelled = container.fractions(header.normals, "the normals of the body", this._rest.length / 3, 3);
     normalise(modelled, modelled);
     this._surface = new Float32Array(this._rest.length);
-    this._shadings = this.parts.map(({ positions, triangles, count: size, first }) => {
-      const shading = new Shading(triangles, positions, new Uint8Array(size).fill(1));
-      const surface = this._surface.subarray(3 * first, 3 * (first + size));
+    this._shadings = this.parts.map((part) => {
+      const shading = new Shading(part, new Uint8Array(part.count).fill(1));
+      const surface = this._surface.subarray(3 * part.first, 3 * (part.first + part.count));
       surface.set(shading.rest);
-      return { shading, positions, surface };
+      return { shading, positions: part.positions, surface };
     });
     /** What the normals as modelled are besides those of the triangles. */
     this._besides = modelled.map((number, at) => number - this._surface[at]);

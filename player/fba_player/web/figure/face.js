@@ -45,9 +45,9 @@ export class Face {
     this._transforms = readTransforms(header, this.parts);
     const moving = new Uint8Array(count);
     for (const { row, rows } of this._tracks) for (let at = row; at < row + rows; at += 1) moving[this._rows[at]] = 1;
-    this._shadings = this.parts.map(({ first, count: size, positions, triangles, normals }) => {
-      const shading = new Shading(triangles, positions, moving.subarray(first, first + size));
-      normals.set(shading.rest);
+    this._shadings = this.parts.map((part) => {
+      const shading = new Shading(part, moving.subarray(part.first, part.first + part.count));
+      part.normals.set(shading.rest);
       return shading;
     });
     this._faps = new Float64Array(FAPS);

@@ -6,14 +6,14 @@ import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.
 /**
  * A mesh of a figure, whose vertices are count from `first` on. positions, normals: three numbers each, in metres, which
  * move. changed: whether the last pose moved them. triangles: three vertices each, counted from 0, counter-clockwise from
- * outside. colour: linear light. gloss: 1 - roughness. colours: linear light, three numbers each, glosses: one each, or
+ * outside. leaders: for each vertex the first that shares its normal. colour: linear light. gloss: 1 - roughness. colours: linear light, three numbers each, glosses: one each, or
  * null where all vertices have `colour` and `gloss`. texture: bytes of a picture in sRGB that multiplies the colours, or
  * null. texcoords: two numbers each, from the picture's top left. alpha: what texture's alpha and opacity mean, as in
  * `fba.mesh.Material`. across: of single hairs, eight numbers each; scatter, closed, smooth, opaque: as in `FaceShape` of the
  * desktop player, which says what shaders take. ball: whether it is an eyeball, which has a shader of its own.
  * @typedef {{
  *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array, changed: boolean,
- *   triangles: Uint32Array, colour: Float64Array, gloss: number, colours: Float32Array | null, glosses: Float32Array | null,
+ *   triangles: Uint32Array, leaders: Uint32Array, colour: Float64Array, gloss: number, colours: Float32Array | null, glosses: Float32Array | null,
  *   texture: Uint8Array | null, texcoords: Float32Array | null, opacity: number, alpha: string, cutoff: number,
  *   twoSided: boolean, across: Float32Array | null, scatter: number, closed: boolean, smooth: boolean, opaque: boolean,
  *   ball: boolean,
@@ -21,7 +21,6 @@ import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.
  */
 
 const ALPHAS = ["auto", "opaque", "mask", "blend"];
-const SAME_SURFACE = 0.7; // cosine between the normals of vertices at one place that share a normal
 
 /**
  * Return the parts that a header lists; positions and normals of all of them are handed in.
@@ -46,7 +45,15 @@ export function readParts(container, listed, positions, normals) {
 function mesh(container, entry, count, what) {
   const corners = container.indices(entry.triangles, `the triangles of ${what}`, count, undefined, 1);
   if (corners.length % 3) refuse(`has ${corners.length} corners in ${what}, expected three a triangle`);
-  return { name: String(entry.name), kind: String(entry.kind), count, triangles: Uint32Array.from(corners) };
+  const leaders = new Uint32Array(count).map((_, at) => at);
+  if (entry.seams !== undefined) {
+    const before = container.indices(entry.seams, `the seams of ${what}`, count, count, 1);
+    for (let at = 0; at < count; at += 1) {
+      if (before[at] > at) refuse(`has a seam before the first vertex of ${what}`);
+      leaders[at] -= before[at];
+    }
+  }
+  return { name: String(entry.name), kind: String(entry.kind), count, triangles: Uint32Array.from(corners), leaders };
 }
 
 /** @param {Container} container @param {Record<string, any>} entry @param {number} count @param {string} what */
@@ -99,20 +106,16 @@ export function readLight(container, header, count) {
 
 /** Computes the normals of a part from its triangles, smooth across vertices at one place. */
 export class Shading {
-  /** @param {Uint32Array} triangles @param {Float32Array} rest neutral positions of the part @param {Uint8Array} moving which vertices may move by themselves */
-  constructor(triangles, rest, moving) {
+  /** @param {Part} part whose positions are neutral @param {Uint8Array} moving which of its vertices may move by themselves */
+  constructor({ triangles, positions: rest, leaders }, moving) {
     const count = rest.length / 3;
-    const alone = new Uint32Array(count).map((_, at) => at);
-    const own = new Float32Array(3 * count);
-    sum(triangles, triangles, rest, own);
-    normalise(own, own);
-    this._group = groups(rest, own, alone);
+    this._group = leaders;
     const corners = triangles.map((corner) => this._group[corner]);
     const sums = new Float32Array(3 * count);
     sum(triangles, corners, rest, sums);
     normalise(sums, sums);
     /** Neutral normals. */
-    this.rest = own.map((_, at) => sums[3 * this._group[Math.floor(at / 3)] + (at % 3)]);
+    this.rest = sums.map((_, at) => sums[3 * this._group[Math.floor(at / 3)] + (at % 3)]);
     const changing = new Uint8Array(count);
     for (let at = 0; at < triangles.length; at += 3) {
       if (moving[triangles[at]] || moving[triangles[at + 1]] || moving[triangles[at + 2]]) {
@@ -123,7 +126,7 @@ export class Shading {
     const chosen = new Uint32Array(triangles.length / 3).map((_, at) => 3 * at).filter(used);
     this._triangles = expandTriangles(triangles, chosen);
     this._corners = expandTriangles(corners, chosen);
-    this._vertices = alone.filter((at) => changing[this._group[at]]);
+    this._vertices = leaders.map((_, at) => at).filter((at) => changing[leaders[at]]);
     this._sums = sums;
   }
 
@@ -201,25 +204,4 @@ export function normalise(vectors, out) {
     out[at + 1] = still ? 0 : y / length;
     out[at + 2] = still ? 1 : z / length;
   }
-}
-
-/** Return the first of the vertices at each vertex's place whose surface is the same. @param {Float32Array} positions @param {Float32Array} normals @param {Uint32Array} alone */
-function groups(positions, normals, alone) {
-  /** @type {Map<string, number[]>} */
-  const leaders = new Map();
-  return alone.map((vertex) => {
-    const at = 3 * vertex;
-    const key = `${positions[at]} ${positions[at + 1]} ${positions[at + 2]}`;
-    const here = leaders.get(key);
-    if (!here) {
-      leaders.set(key, [vertex]);
-      return vertex;
-    }
-    const same = here.find((other) => {
-      const from = 3 * other;
-      return normals[at] * normals[from] + normals[at + 1] * normals[from + 1] + normals[at + 2] * normals[from + 2] > SAME_SURFACE;
-    });
-    if (same === undefined) here.push(vertex);
-    return same ?? vertex;
-  });
 }
