@@ -18,10 +18,12 @@ from typing import Any
 
 import pytest
 
+import fba
 from fba.codec import Decoder
 from tools.captures import face_files
 
 websockets = pytest.importorskip("websockets")
+SAMPLE = Path(__file__).parents[1] / "fba" / "samples" / "hello.fap"
 VIEWERS = 200
 SECONDS = 10
 RATE = 60
@@ -55,9 +57,8 @@ def processor_seconds(number: int) -> float:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_many_viewers(benchmark: Any, tmp_path: Path, report: Callable[[str], None]) -> None:
+def test_many_viewers(benchmark: Any, report: Callable[[str], None]) -> None:
     """The share of a core that the server takes; frames per second are those of the file."""
-    file = Path(__file__).parents[1] / "fba" / "samples" / "hello.fap"
     counts = [0] * VIEWERS
 
     async def watch(number: int, url: str) -> None:
@@ -81,7 +82,7 @@ def test_many_viewers(benchmark: Any, tmp_path: Path, report: Callable[[str], No
         await asyncio.gather(*viewers, return_exceptions=True)
         return share, frames
 
-    with serving("serve", file, "--loop", "--port", 0) as (program, said):
+    with serving("serve", SAMPLE, "--loop", "--port", 0) as (program, said):
         share, frames = benchmark.pedantic(
             lambda: asyncio.run(measure(program, address(said))), rounds=1, iterations=1
         )
@@ -93,6 +94,7 @@ def test_a_frame_of_a_capture(benchmark: Any, report: Callable[[str], None]) -> 
     """From a datagram to the decoded frame in another process, over the loopback."""
     from websockets.sync.client import connect
 
+    Decoder().push(fba.encode(fba.read(SAMPLE)))  # or the first frames wait for compiled code
     count = SECONDS * RATE
     faces = face_files.livelink_udp({**face_files.face_weights(count), **face_files.face_angles(count)})
     late: list[float] = []
