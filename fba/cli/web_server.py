@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from fba.serving import Server, Stage
+    from fba.serving import Plane, Server, Stage
 
 HOST_HELP = (
     "Own address to listen on, 0.0.0.0 for all; viewers then need the address with a random token that is "
@@ -42,9 +42,9 @@ def open_server(
 
 
 class StreamTarget:
-    """A target of a `fba.live.StreamRecorder` that shows its stream to viewers."""
+    """A target of a `fba.live.StreamRecorder` that shows its stream to viewers; to nobody without a stage."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: Stage | None = None) -> None:
         from fba.serving import PlaneSplitter
 
         self._stage = stage
@@ -56,12 +56,16 @@ class StreamTarget:
 
     def write(self, data: bytes, ending: bytes) -> None:
         """Add bytes."""
-        for plane in self._splitter.push(data) if data else ():
-            self._stage.publish(plane)
+        self._publish(self._splitter.push(data) if data else [])
 
     def close(self) -> None:
         """End the stream."""
         if self._splitter.planes:
-            for plane in self._splitter.finish():
+            self._publish(self._splitter.finish())
+            if self._stage is not None:
+                self._stage.end(self._splitter.ending)
+
+    def _publish(self, planes: list[Plane]) -> None:
+        if self._stage is not None:
+            for plane in planes:
                 self._stage.publish(plane)
-            self._stage.end(self._splitter.ending)

@@ -172,10 +172,12 @@ def _write_all(file: BinaryIO, data: bytes) -> None:
         view = view[file.write(view) :]
 
 
-def warm_up(*, bodies: bool = False, rated: bool = False, compact: bool = False) -> None:
+def warm_up(
+    targets: Sequence[Target] = (), *, bodies: bool = False, rated: bool = False, compact: bool = False
+) -> None:
     """Compile the encoder of faces, and of bodies, since datagrams that come meanwhile would be lost.
 
-    rated: for a bit rate. compact: as of `StreamRecorder`.
+    targets: get a stream of three frames. rated: for a bit rate. compact: as of `StreamRecorder`.
     """
     import numpy as np
 
@@ -191,7 +193,7 @@ def warm_up(*, bodies: bool = False, rated: bool = False, compact: bool = False)
     if bodies:
         solver = BapSolver()
         solver.solve(solver.pose(turns))
-    recorder = StreamRecorder([], bit_rate=1e6 if rated else None, compact=compact)
+    recorder = StreamRecorder(targets, bit_rate=1e6 if rated else None, compact=compact)
     for frame in range(3):
         part = slice(frame, frame + 1)
         shown = None if body is None else body[part]

@@ -171,4 +171,4 @@ def test_ports_that_cannot_be_had_and_a_missing_package(
     monkeypatch.setitem(sys.modules, "websockets.asyncio.server", None)
     result = run("serve", path)
     assert result.code == 1
-    assert 'pip install "mpeg4-fba[serve]"' in result.err
+    assert "[serve]" in result.err

@@ -166,7 +166,8 @@ def command(request: _Request) -> None:
     kind = find_kind(request.kind)
     if network.ask is not None and not kind.asked_port:
         raise click.UsageError(f"--ask: {kind.description} sends by itself; enter our address in the app")
-    warm_up(bodies=kind.bodies, rated=coding.bit_rate is not None, compact=coding.is_compact)
+    tried = [] if request.serve is None else [StreamTarget()]
+    warm_up(tried, bodies=kind.bodies, rated=coding.bit_rate is not None, compact=coding.is_compact)
     raise_delayed()  # from here on, Ctrl-C ends the capture and not the command
     targets, stream = _targets(output, play=request.play)
     with _server(request, kind.description) as server:
