@@ -93,12 +93,12 @@ fba_conformance.suite
 fba_player._mesh
 fba_player.view
 fba_player._figure
+fba_player.web
 fba_player.playback
 fba_player.scene
 fba_player.gl
 fba_player.sound
 fba_player.export
-fba_player.web
 fba_player.session
 fba_player._ui.theme
 fba_player._ui.ruler

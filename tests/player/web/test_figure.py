@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fba_player.playback.timeline import Timeline
 
 import fba
 from fba.arrays import Float64
@@ -22,7 +23,6 @@ from fba.face import FaceModel, Function, InterpolationTable, Link, Term, resolv
 from fba.tracks import FaceTrack
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._figure.person import Person, build_person
-from fba_player.playback.timeline import Timeline
 from fba_player.view._geometry import rotation_vector
 from fba_player.web._packing import DETAIL, Packed, pack_figure
 from tools.web import make_tables
