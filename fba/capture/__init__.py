@@ -6,7 +6,6 @@ May use: parameters, face and body, and the modules of `fba` itself.
 
 from fba.capture._conversion import FaceCapture, capture_options, make_animation
 from fba.capture._report import BoneError, FeetError, RetargetReport, measure_bones, retarget_report
-from fba.capture._retarget import SkeletonOptions
 from fba.capture.blendshapes import (
     ActionUnitMotion,
     ShapeMotion,
@@ -18,7 +17,7 @@ from fba.capture.markers._faces import from_markers
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion
 from fba.capture.points import PointMotion, from_points
-from fba.capture.skeleton import Captured, from_skeleton, retarget_motion
+from fba.capture.skeleton import Captured, SkeletonOptions, from_skeleton, retarget_motion
 
 __all__ = [
     "ActionUnitMotion",

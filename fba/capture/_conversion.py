@@ -8,13 +8,12 @@ from dataclasses import fields
 from fractions import Fraction
 from typing import Any
 
-from fba.capture._retarget import SkeletonOptions
 from fba.capture.blendshapes import ActionUnitMotion, ShapeMotion, from_action_units, from_blendshapes
 from fba.capture.markers._faces import from_markers
 from fba.capture.markers.motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion
 from fba.capture.points import PointMotion, from_points
-from fba.capture.skeleton import Captured, retarget_motion
+from fba.capture.skeleton import Captured, SkeletonOptions, retarget_motion
 from fba.errors import FbaWarning
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
