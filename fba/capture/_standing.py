@@ -131,7 +131,8 @@ def _trunk_axes(positions: Mapping[str, Float64]) -> Float64:
     def middle(*joints: str) -> Float64 | None:
         if not all(joint in positions for joint in joints):
             return None
-        return np.mean([positions[joint] for joint in joints], axis=0)
+        result: Float64 = np.mean([positions[joint] for joint in joints], axis=0)
+        return result
 
     pairs = [
         positions[f"l_{joint}"] - positions[f"r_{joint}"]
