@@ -133,10 +133,11 @@ def measure_bones(
         matrices = solver.pose(animation.body.values[begin:end])
         for column, (joint, aim) in enumerate(aims):
             body_bone = matrices[:, order[aim], :3, 3] - matrices[:, order[joint], :3, 3]
-            source_bone = source.positions[aim][begin:end] - source.positions[joint][begin:end]
             if joint in rest_alignment.neutral_joints():
                 at_rest = alignment.corrections[joint] @ skeleton.bone(joint, aim)
-                source_bone = source.rotations(joint)[begin:end] @ at_rest
+                source_bone = source.rotations(joint, slice(begin, end)) @ at_rest
+            else:
+                source_bone = source.positions[aim][begin:end] - source.positions[joint][begin:end]
             angles[begin:end, column] = rotations.degrees_between(body_bone, source_bone)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
         body = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3])

@@ -57,7 +57,7 @@ def _correct_clavicle(side: str, sample: MappedMotion, rest: Float64) -> None:
     above = int(sample.motion.parents[number])
     if above < 0 or len(low) < MIN_HANGING_FRAMES:
         return
-    turn = mean_turn(sample.motion.joint_rotations(above)[low], sample.rotations(inner)[low])
+    turn = mean_turn(sample.motion.joint_rotations(above, low), sample.rotations(inner, low))
     angle = float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1.0, 1.0))))
     if angle > MAX_PERSONAL_TURN:
         rest[number] = rotations.part(np.eye(3), turn, 1.0 - MAX_PERSONAL_TURN / angle)
@@ -78,7 +78,7 @@ def _correct_feet(sample: MappedMotion, rows: Intp, rest: Float64) -> None:
         still = low[np.argsort(speed[low], kind="stable")][: max(1, len(low) // 3)]
         if speed[still].max() > MAX_STANDING_SPEED:
             return
-        up = sample.rotations(ankle)[still, 1].mean(axis=0)  # world up as the foot sees it
+        up = sample.rotations(ankle, still)[:, 1].mean(axis=0)  # world up as the foot sees it
         if np.degrees(np.arccos(np.clip(np.linalg.norm(up), 0.0, 1.0))) > MAX_STANDING_TURN:
             return
         ups.append(rotations.unit(up))

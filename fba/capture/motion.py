@@ -144,9 +144,9 @@ class SkeletonMotion:
         turned.flags.writeable = positions.flags.writeable = False
         return turned, positions
 
-    def joint_rotations(self, joint: int) -> Float64:
-        """Return the rotations (T, 3, 3) of a joint in the world, against the rest pose."""
-        return rotations.matrices(self.world()[0][:, joint])
+    def joint_rotations(self, joint: int, rows: slice | Intp = slice(None)) -> Float64:
+        """Return the rotations (T, 3, 3) of a joint in the world, against the rest pose, in some frames."""
+        return rotations.matrices(self.world()[0][rows, joint])
 
     def turn_axes(self, turn: Float64) -> SkeletonMotion:
         """Return the same motion in other axes of the world. turn: (3, 3), from the old axes to the new."""
@@ -233,9 +233,9 @@ class MappedMotion:
         rest = self.motion.rest()
         return {joint: rest[number] for joint, number in self.mapped.items()}
 
-    def rotations(self, joint: str) -> Float64:
-        """Return the rotations (T, 3, 3) of a joint of the body in the world, against the rest pose."""
-        return self.motion.joint_rotations(self.mapped[joint])
+    def rotations(self, joint: str, rows: slice | Intp = slice(None)) -> Float64:
+        """Return `SkeletonMotion.joint_rotations` of a joint of the body."""
+        return self.motion.joint_rotations(self.mapped[joint], rows)
 
     def select(self, rows: slice | Intp) -> MappedMotion:
         """Return some frames, see `SkeletonMotion.select`."""
