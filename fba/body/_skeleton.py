@@ -124,6 +124,11 @@ class Skeleton:
         """Return the number of a joint; KeyError for an unknown name."""
         return self._numbers[name]
 
+    def bone(self, start: str, end: str) -> Float64:
+        """Return the vector (3,) from a joint to another in the default posture, metres."""
+        vector: Float64 = self.centres[self._numbers[end]] - self.centres[self._numbers[start]]
+        return vector
+
     def descendants(self, joint: int) -> list[int]:
         """Return the numbers of a joint and all joints below it, parents first."""
         below = [joint]

@@ -6,8 +6,7 @@ May use: parameters, face and body, and the modules of `fba` itself.
 
 from fba.capture._conversion import FaceCapture, capture_options, make_animation
 from fba.capture._report import BoneError, FeetError, RetargetReport, measure_bones, retarget_report
-from fba.capture._retarget import SkeletonOptions
-from fba.capture._skeleton import Captured, from_skeleton, retarget_motion
+from fba.capture._skeleton import Captured, SkeletonOptions, from_skeleton, retarget_motion
 from fba.capture.blendshapes import (
     ActionUnitMotion,
     ShapeMotion,

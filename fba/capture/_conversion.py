@@ -8,8 +8,7 @@ from dataclasses import fields
 from fractions import Fraction
 from typing import Any
 
-from fba.capture._retarget import SkeletonOptions
-from fba.capture._skeleton import Captured, retarget_motion
+from fba.capture._skeleton import Captured, SkeletonOptions, retarget_motion
 from fba.capture.blendshapes import ActionUnitMotion, ShapeMotion, from_action_units, from_blendshapes
 from fba.capture.markers._faces import from_markers
 from fba.capture.markers._motion import MarkerMotion

@@ -13,7 +13,7 @@ from fba.arrays import Float64
 from fba.body import BapSolver, ground
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture._limbs import soles
-from fba.capture.motion import SkeletonMotion
+from fba.capture.motion import MappedMotion, SkeletonMotion
 from fba.capture.preparation import Preparation, prepare
 from fba.choices import SignedUpAxis
 from fba.errors import ModelError
@@ -115,30 +115,29 @@ def measure_bones(
 ) -> RetargetReport:
     """Return the same as `retarget_report` for a motion that was prepared, and an animation with a body."""
     solver = solver if solver is not None else BapSolver()
-    skeleton, mapped = solver.skeleton, ready.mapped
-    motion = ready.motion.resample(animation.rate)
+    skeleton = solver.skeleton
+    source = MappedMotion(ready.motion.resample(animation.rate), ready.mapped)
     assert animation.body is not None
-    count = min(len(motion), len(animation))
+    count = min(len(source.motion), len(animation))
 
-    alignment = rest_alignment.align(motion, mapped, skeleton)
-    turned, positions = motion.world()
+    alignment = rest_alignment.align(source, skeleton)
     order = {name: number for number, name in enumerate(skeleton.names)}
     aims = sorted(alignment.aims.items(), key=lambda pair: order[pair[0]])
     angles = np.zeros((count, len(aims)))
     heights = np.zeros((2, count))
     has_feet = True
-    metres = rest_alignment.scale(motion, mapped, skeleton) if scale is None else scale
-    source = soles.source_soles(motion, mapped, turned, positions, metres) if metres else None
+    metres = rest_alignment.scale(source, skeleton) if scale is None else scale
+    source_soles = soles.source_soles(source, metres) if metres else None
     for begin in range(0, count, POSED_FRAMES):
         end = min(begin + POSED_FRAMES, count)
         matrices = solver.pose(animation.body.values[begin:end])
         for column, (joint, aim) in enumerate(aims):
             body_bone = matrices[:, order[aim], :3, 3] - matrices[:, order[joint], :3, 3]
-            source_bone = positions[begin:end, mapped[aim]] - positions[begin:end, mapped[joint]]
             if joint in rest_alignment.neutral_joints():
-                at_rest = skeleton.centres[order[aim]] - skeleton.centres[order[joint]]
-                frames_of_bone = rotations.matrices(turned[begin:end, mapped[joint]])
-                source_bone = frames_of_bone @ (alignment.corrections[joint] @ at_rest)
+                at_rest = alignment.corrections[joint] @ skeleton.bone(joint, aim)
+                source_bone = source.rotations(joint, slice(begin, end)) @ at_rest
+            else:
+                source_bone = source.positions[aim][begin:end] - source.positions[joint][begin:end]
             angles[begin:end, column] = rotations.degrees_between(body_bone, source_bone)
         frames = {name: matrices[:, number, :3, :3] for name, number in order.items()}
         body = soles.body_soles(skeleton, frames, matrices[:, 0, :3, 3])
@@ -149,22 +148,24 @@ def measure_bones(
         BoneError(
             joint,
             aim,
-            motion.names[mapped[joint]],
+            source.motion.names[source.mapped[joint]],
             float(angles[:, column].mean()),
             float(angles[:, column].max()),
             int(angles[:, column].argmax()),
         )
         for column, (joint, aim) in enumerate(aims)
     )
-    standing = _feet(source, heights, float(motion.rate)) if has_feet and source is not None else None
-    used = set(mapped.values())
+    feet = None
+    if has_feet and source_soles is not None:
+        feet = _feet(source_soles, heights, float(source.motion.rate))
+    used = set(source.mapped.values())
     return RetargetReport(
         ready.family,
         count,
         bones,
-        standing,
-        tuple(name for number, name in enumerate(motion.names) if number not in used),
-        tuple(joint for joint in solver.convention.joints if joint in skeleton and joint not in mapped),
+        feet,
+        tuple(name for number, name in enumerate(source.motion.names) if number not in used),
+        tuple(joint for joint in solver.convention.joints if joint in skeleton and joint not in source),
         {
             what: f"{reason} (confidence {ready.confidence[what]:.2f})"
             for what, reason in ready.reasons.items()

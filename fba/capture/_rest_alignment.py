@@ -7,7 +7,6 @@ point in the directions of the source's bones, whether its rest pose is a T, an 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -18,7 +17,7 @@ from fba import rotations
 from fba.arrays import Float64
 from fba.body import Skeleton
 from fba.capture._spine import joints as spine_joints
-from fba.capture.motion import SkeletonMotion
+from fba.capture.motion import MappedMotion
 from fba.errors import ModelError
 from fba.text_files import packaged_rows
 
@@ -75,12 +74,12 @@ class Alignment:
     aims: dict[str, str]
 
 
-def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> Alignment:
+def align(source: MappedMotion, skeleton: Skeleton) -> Alignment:
     """Return the corrections of all mapped joints. ModelError without size, or left and right."""
-    aligner = _Aligner(motion, mapped, skeleton)
+    aligner = _Aligner(source, skeleton)
     aligner.align_spine()
     for bone in bones():
-        if bone.joint in mapped:
+        if bone.joint in source:
             aligner.align_limb(bone)
     return Alignment(aligner.corrections, aligner.aims)
 
@@ -88,26 +87,25 @@ def align(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton)
 class _Aligner:
     """Finds the corrections of joints one by one, parents first. `facing` is the correction of the pelvis."""
 
-    def __init__(self, motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> None:
-        self.motion, self.mapped, self.skeleton = motion, mapped, skeleton
-        self.rest = motion.rest()
-        size = float(np.ptp(self.rest, axis=0).max())
+    def __init__(self, source: MappedMotion, skeleton: Skeleton) -> None:
+        self.source, self.skeleton = source, skeleton
+        size = float(np.ptp(source.motion.rest(), axis=0).max())
         if size <= 0:
             raise ModelError("the source's joints all coincide in its rest pose; it has no bones")
         self.shortest = MIN_BONE_LENGTH * size
-        self.facing = _facing(self.rest, mapped)
+        self.facing = _facing(source)
         self.corrections: dict[str, Float64] = {"sacroiliac": self.facing}
         self.aims: dict[str, str] = {}
 
     def align_spine(self) -> None:
-        spine = [joint for joint in spine_joints(self.skeleton) if joint in self.mapped]
+        spine = [joint for joint in spine_joints(self.skeleton) if joint in self.source]
         for joint, above in pairwise(spine):
             self.corrections[joint] = self._align_bone(joint, above, self.facing)
         self.corrections[spine[-1]] = self.corrections["sacroiliac"] = self.facing
 
     def align_limb(self, bone: Bone) -> None:
         start = self.corrections.get(bone.base, self.facing)
-        aim = next((aim for aim in bone.aims if aim in self.mapped), None)
+        aim = next((aim for aim in bone.aims if aim in self.source), None)
         if aim is None:
             correction = self._align_last_bone(bone, start)
         else:
@@ -121,12 +119,7 @@ class _Aligner:
         self.corrections[bone.joint] = correction
 
     def _source_bone(self, joint: str, aim: str) -> Float64:
-        bone: Float64 = self.rest[self.mapped[aim]] - self.rest[self.mapped[joint]]
-        return bone
-
-    def _body_bone(self, joint: str, aim: str) -> Float64:
-        centres, number = self.skeleton.centres, self.skeleton.number
-        bone: Float64 = centres[number(aim)] - centres[number(joint)]
+        bone: Float64 = self.source.rest[aim] - self.source.rest[joint]
         return bone
 
     def _align_bone(self, joint: str, aim: str, start: Float64, via: str = "") -> Float64:
@@ -135,7 +128,7 @@ class _Aligner:
         if np.linalg.norm(source) <= self.shortest:
             return start
         self.aims[joint] = aim
-        bone = start @ self._body_bone(joint, aim)
+        bone = start @ self.skeleton.bone(joint, aim)
         if via == "down":
             down = np.array([0.0, -1.0, 0.0])
             return rotations.between(down, source) @ rotations.between(bone, down) @ start
@@ -143,18 +136,19 @@ class _Aligner:
 
     def _align_last_bone(self, bone: Bone, start: Float64) -> Float64:
         """Return the start, turned so that a bone without a next joint points to the end of the source's."""
-        tips = self.motion.end_offsets[self.motion.end_parents == self.mapped[bone.joint]]
+        motion = self.source.motion
+        tips = motion.end_offsets[motion.end_parents == self.source.mapped[bone.joint]]
         if not bone.tip or not len(tips):
             return start
         source = tips.mean(axis=0)
         if np.linalg.norm(source) <= self.shortest:
             return start
-        return rotations.between(start @ self._body_bone(bone.joint, bone.tip), source) @ start
+        return rotations.between(start @ self.skeleton.bone(bone.joint, bone.tip), source) @ start
 
     def _level_foot(self, joint: str, aim: str) -> Float64:
         """Return the correction of a flat sole: only the heading of the foot counts."""
         source = self._source_bone(joint, aim)
-        body = self.facing @ self._body_bone(joint, aim)
+        body = self.facing @ self.skeleton.bone(joint, aim)
         if min(np.hypot(bone[0], bone[2]) for bone in (source, body)) <= self.shortest:
             return self.facing
         angle = np.arctan2(source[0], source[2]) - np.arctan2(body[0], body[2])
@@ -165,12 +159,12 @@ class _Aligner:
         side = joint[0]
         first = f"{side}_index1"
         lasts = (f"{side}_{finger}1" for finger in ("pinky", "ring"))
-        last = next((knuckle for knuckle in lasts if knuckle in self.mapped), None)
-        if first not in self.mapped or last is None or joint not in self.aims:
+        last = next((knuckle for knuckle in lasts if knuckle in self.source), None)
+        if first not in self.source or last is None or joint not in self.aims:
             return correction
         along = self._source_bone(joint, aim)
         along = along / np.linalg.norm(along)
-        source, body = self._source_bone(first, last), correction @ self._body_bone(first, last)
+        source, body = self._source_bone(first, last), correction @ self.skeleton.bone(first, last)
         source, body = source - along * (along @ source), body - along * (along @ body)
         if np.linalg.norm(source) <= self.shortest or np.linalg.norm(body) == 0:
             return correction
@@ -178,32 +172,31 @@ class _Aligner:
         return rotations.turn(along, np.array(angle)) @ correction
 
 
-def scale(motion: SkeletonMotion, mapped: Mapping[str, int], skeleton: Skeleton) -> float | None:
+def scale(source: MappedMotion, skeleton: Skeleton) -> float | None:
     """Return the ratio of leg lengths of body and source, else of arm lengths; None without limbs."""
-    positions = motion.rest()
     for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")):
-        body = source = 0.0
+        body = captured = 0.0
         for side in "lr":
             names = [f"{side}_{part}" for part in chain]
-            if not all(name in mapped and name in skeleton for name in names):
+            if not all(name in source and name in skeleton for name in names):
                 continue
             for a, b in pairwise(names):
                 ends = skeleton.centres[[skeleton.number(a), skeleton.number(b)]]
                 body += float(np.linalg.norm(ends[1] - ends[0]))
-                source += float(np.linalg.norm(positions[mapped[b]] - positions[mapped[a]]))
-        if source > 0:
-            return body / source
+                captured += float(np.linalg.norm(source.rest[b] - source.rest[a]))
+        if captured > 0:
+            return body / captured
     return None
 
 
-def _facing(rest: Float64, mapped: Mapping[str, int]) -> Float64:
+def _facing(source: MappedMotion) -> Float64:
     """Return the rotation (3, 3) from the default posture's heading to that of the rest pose, y up.
 
     Only the heading: a rest pose stands on its feet, so if its joints lean, that is due to its proportions.
     """
     for a, b in (("l_hip", "r_hip"), ("l_shoulder", "r_shoulder"), ("l_knee", "r_knee")):
-        if a in mapped and b in mapped:
-            left = (rest[mapped[a]] - rest[mapped[b]]) * [1.0, 0.0, 1.0]
+        if a in source and b in source:
+            left = (source.rest[a] - source.rest[b]) * [1.0, 0.0, 1.0]
             length = float(np.linalg.norm(left))
             if length > 0:
                 side = left / length

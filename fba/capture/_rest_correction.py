@@ -7,15 +7,13 @@ clavicles are as in someone whose arms hang, and soles are flat.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64, Intp
 from fba.capture import _standing as standing
-from fba.capture._rest_from_motion import LOW_ARM, mean_turn, with_rest
-from fba.capture.motion import SkeletonMotion
+from fba.capture._rest_from_motion import LOW_ARM, mean_turn
+from fba.capture.motion import MappedMotion, SkeletonMotion
 
 MAX_FRAMES = 1000
 """Largest number of frames, spread evenly over the motion, that are examined."""
@@ -37,74 +35,67 @@ USUAL_SLOPE = -27.0
 UP = np.array([0.0, 1.0, 0.0])
 
 
-def correct_rest(motion: SkeletonMotion, mapped: Mapping[str, int]) -> SkeletonMotion:
+def correct_rest(source: MappedMotion) -> SkeletonMotion:
     """Return a motion, y up, whose rest pose has clavicles as with hanging arms, and flat feet."""
+    motion = source.motion
     rows = motion.spread(MAX_FRAMES)
-    sample = motion.select(rows)
-    quaternions, positions = sample.world()
-    turned = rotations.matrices(quaternions)
+    sample = source.select(rows)
     rest = np.tile(np.eye(3), (len(motion.names), 1, 1))
     for side in "lr":
-        _correct_clavicle(side, sample, mapped, turned, positions, rest)
-    _correct_feet(sample, mapped, turned, positions, rows, rest)
-    return motion if (rest == np.eye(3)).all() else with_rest(motion, rest)
+        _correct_clavicle(side, sample, rest)
+    _correct_feet(sample, rows, rest)
+    return motion if (rest == np.eye(3)).all() else motion.with_rest(rest)
 
 
-def _correct_clavicle(
-    side: str, motion: SkeletonMotion, mapped: Mapping[str, int], turned: Float64, positions: Float64,
-    rest: Float64,
-) -> None:  # fmt: skip
-    needed = [f"{side}_{joint}" for joint in ("sternoclavicular", "shoulder", "elbow")]
-    if not all(joint in mapped for joint in needed):
+def _correct_clavicle(side: str, sample: MappedMotion, rest: Float64) -> None:
+    joints = inner, shoulder, elbow = [f"{side}_{j}" for j in ("sternoclavicular", "shoulder", "elbow")]
+    if not all(joint in sample for joint in joints):
         return
-    inner, shoulder, elbow = (mapped[joint] for joint in needed)
-    arm = rotations.unit(positions[:, elbow] - positions[:, shoulder])
+    arm = rotations.unit(sample.positions[elbow] - sample.positions[shoulder])
     low = np.flatnonzero(arm[:, 1] < -LOW_ARM)
-    above = int(motion.parents[inner])
+    number = sample.mapped[inner]
+    above = int(sample.motion.parents[number])
     if above < 0 or len(low) < MIN_HANGING_FRAMES:
         return
-    turn = mean_turn(turned, above, inner, low)
+    turn = mean_turn(sample.motion.joint_rotations(above, low), sample.rotations(inner, low))
     angle = float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1.0, 1.0))))
     if angle > MAX_PERSONAL_TURN:
-        rest[inner] = rotations.part(np.eye(3), turn, 1.0 - MAX_PERSONAL_TURN / angle)
+        rest[number] = rotations.part(np.eye(3), turn, 1.0 - MAX_PERSONAL_TURN / angle)
 
 
-def _correct_feet(
-    motion: SkeletonMotion, mapped: Mapping[str, int], turned: Float64, positions: Float64, rows: Intp,
-    rest: Float64,
-) -> None:  # fmt: skip
-    at_rest = motion.rest()
-    size = float(np.ptp(at_rest, axis=0).max())
+def _correct_feet(sample: MappedMotion, rows: Intp, rest: Float64) -> None:
+    """Turn the rest of both feet. rows: numbers of the sample's frames in the whole motion."""
+    size = float(np.ptp(sample.motion.rest(), axis=0).max())
     ups = []
     for side in "lr":
-        ankle = mapped.get(f"{side}_ankle")
-        if ankle is None or len(rows) < 2:
+        ankle = f"{side}_ankle"
+        if ankle not in sample or len(rows) < 2:
             return
-        seconds = np.gradient(rows.astype(np.float64)) / float(motion.rate)
-        speed = np.linalg.norm(np.gradient(positions[:, ankle], axis=0), axis=1) / (seconds * size)
-        height = positions[:, ankle, 1]
+        seconds = np.gradient(rows.astype(np.float64)) / float(sample.motion.rate)
+        speed = np.linalg.norm(np.gradient(sample.positions[ankle], axis=0), axis=1) / (seconds * size)
+        height = sample.positions[ankle][:, 1]
         low = np.flatnonzero(height <= np.median(height))
         still = low[np.argsort(speed[low], kind="stable")][: max(1, len(low) // 3)]
         if speed[still].max() > MAX_STANDING_SPEED:
             return
-        up = turned[still, ankle][:, 1].mean(axis=0)  # world up as the foot sees it
+        up = sample.rotations(ankle, still)[:, 1].mean(axis=0)  # world up as the foot sees it
         if np.degrees(np.arccos(np.clip(np.linalg.norm(up), 0.0, 1.0))) > MAX_STANDING_TURN:
             return
         ups.append(rotations.unit(up))
-    facing = standing.measure(at_rest[None], mapped)
+    facing = standing.measure_rest(sample)
     ahead, left = np.cross(facing.left[0], UP), facing.left[0]
     pitch = [float(np.degrees(np.arctan2(up @ ahead, up[1]))) for up in ups]
     roll = [float(np.degrees(np.arctan2(up @ left, up[1]))) for up in ups]
     mean_pitch = sum(pitch) / 2 if abs(pitch[0] - pitch[1]) < MAX_ASYMMETRY else 0.0
     mean_roll = (roll[0] - roll[1]) / 2 if abs(roll[0] + roll[1]) < MAX_ASYMMETRY else 0.0
     for side, own_roll in (("l", mean_roll), ("r", -mean_roll)):
-        ankle, toe = mapped[f"{side}_ankle"], mapped.get(f"{side}_metatarsal")
+        ankle, toe = f"{side}_ankle", f"{side}_metatarsal"
         own_pitch = 0.0
-        if toe is not None:
-            bone = at_rest[toe] - at_rest[ankle]
+        if toe in sample:
+            bone = sample.rest[toe] - sample.rest[ankle]
             slope = float(np.degrees(np.arctan2(bone[1], bone @ ahead)))
             if abs(slope + mean_pitch - USUAL_SLOPE) <= abs(slope - USUAL_SLOPE):
                 own_pitch = mean_pitch
         if FOOT_TURN_RANGE[0] <= max(abs(own_pitch), abs(own_roll)) <= FOOT_TURN_RANGE[1]:
             up = UP + np.tan(np.radians(own_pitch)) * ahead + np.tan(np.radians(own_roll)) * left
-            rest[motion.descendants(ankle)] = rotations.between(up, UP)
+            rest[sample.motion.descendants(sample.mapped[ankle])] = rotations.between(up, UP)

@@ -7,31 +7,98 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from fba import rotations
 from fba.animation import Animation
 from fba.arrays import Float64, Int32
-from fba.body import BapSolver, Skeleton
+from fba.body import ROOT, BapSolver, Skeleton
 from fba.body.solve.solver import solve_track
 from fba.capture import _rest_alignment as rest_alignment
-from fba.capture import _retarget as retarget
-from fba.capture._retarget import SkeletonOptions
+from fba.capture import _spine as spine
+from fba.capture._limbs.foot_planting import plant_feet
+from fba.capture._limbs.targets import Targets
+from fba.capture._limbs.turning import turn_limbs
 from fba.capture.bones import LIMBS
-from fba.capture.motion import SkeletonMotion
+from fba.capture.motion import MappedMotion, SkeletonMotion
 from fba.capture.preparation import Preparation, prepare
-from fba.errors import FbaWarning, ModelError
+from fba.choices import Ground, Origin, SignedUpAxis, Spine
+from fba.errors import FbaWarning, ModelError, Remedy
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import BodyTrack
 
+ORIGINS: tuple[Origin, ...] = get_args(Origin)
+GROUNDS: tuple[Ground, ...] = get_args(Ground)
+SPINES = {"spread": 2, "joints": 0, "simple": 1, "full": spine.GROUPS}
 MIN_REST_COSINE = np.cos(np.radians(1.0))
 """Smallest cosine of the angle between a bone of a limb at rest and in the default posture."""
 MAX_SIZE_DIFFERENCE = 1e-4
 """Share of the body's height by which a joint of the scaled figure may be off its place in the body."""
+MAX_HIP_OFFSET = 1e-4
+"""Largest distance of the hips from their places in the pelvis, as a share of the distance between them."""
 LIMB_BONES = tuple(bone for limb in LIMBS for bone in pairwise(limb))
 """Joints at both ends of each bone of a limb."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkeletonOptions:
+    """How the motion of a skeleton becomes BAPs.
+
+    scale: metres of the body for one unit of the source's root translation; None for the ratio of leg
+    lengths, so that the source's unit does not matter and feet do not slide.
+
+    origin: what is at the body's default position: "source", the source's own origin; "start", the first
+    frame; "middle", the middle of the path, which keeps long walks within the ranges of a stream. ground: how
+    the height of the feet is corrected for the body's own proportions: "floor", feet stand on the ground at
+    height 0, whatever the height of the source's ground; "source", at the height of the source's ground;
+    "none", not corrected. plant: also bend and swing the legs a little, and move the body, so that feet have
+    exactly the height of the source's and slip no more than these; no effect with ground "none".
+
+    spine: "spread" divides the spine's rotations between the vertebrae of groups Spine1 and Spine2 and those
+    of the source's joints, "full" between all vertebrae; both keep the directions of the source's bones
+    exactly. "simple" turns the four vertebrae of group Spine1 only, a number those of Spine1 and the next
+    groups, that many in all: both keep the rotation of the head, and the rest as closely as possible.
+    "joints" turns a vertebra for each joint of the source.
+
+    joints: source joint name -> joint of the standard, in place of what the motion declares and of the
+    built-in families of names. rest, up: the rest pose and the axis that points up; by default both are
+    found, see `fba.capture.preparation.prepare`.
+
+    Raises ValueError for a wrong value.
+    """
+
+    scale: float | None = None
+    origin: Origin = "source"
+    ground: Ground = "floor"
+    plant: bool = True
+    spine: Spine | int = "spread"
+    joints: Mapping[str, str] | None = None
+    rest: str | int = "auto"
+    up: SignedUpAxis = "auto"
+
+    def __post_init__(self) -> None:
+        if self.origin not in ORIGINS:
+            raise ValueError(f"origin must be one of {', '.join(ORIGINS)}, not {self.origin!r}")
+        if self.ground not in GROUNDS:
+            raise ValueError(f"ground must be one of {', '.join(GROUNDS)}, not {self.ground!r}")
+        if not 0 <= self.groups <= SPINES["full"]:
+            raise ValueError(f"spine must be {', '.join(SPINES)}, or 1 to 5 groups, not {self.spine!r}")
+        if self.scale is not None and not (np.isfinite(self.scale) and self.scale > 0):
+            raise ValueError(f"scale must be a positive number, not {self.scale}")
+
+    @property
+    def groups(self) -> int:
+        """Number of groups of vertebrae that share the spine's rotations; -1 for a wrong choice."""
+        if isinstance(self.spine, str):
+            return SPINES.get(self.spine, -1)
+        return self.spine if isinstance(self.spine, int) else -1
+
+    @property
+    def turns_same_joints(self) -> bool:
+        """Whether the joints of the source's spine turn, too."""
+        return self.spine in ("spread", "joints")
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,19 +156,19 @@ def retarget_motion(
     solver = solver if solver is not None else BapSolver()
     rate = motion.rate if rate is None else Fraction(rate)
     _check_frames(motion, rate, limits)
-    if _needs_no_retargeting(motion, options, solver):
-        level = motion.resample(rate, limits=limits)
-        ready = None
-        turned, root = _direct_targets(level, solver.skeleton, options.scale)
-    else:
+    ready = None
+    if not _needs_no_retargeting(motion, options, solver):
         ready = prepare(motion, solver.skeleton, joints=options.joints, rest=options.rest, up=options.up)
-        level = ready.motion.resample(rate, limits=limits)
+    level = (motion if ready is None else ready.motion).resample(rate, limits=limits)
+    if ready is None:
+        turns, root = _direct_targets(level, solver.skeleton, options.scale)
+    else:
         _warn_of_missing(ready.mapped)
-        turned, root = retarget.find_targets(level, ready.mapped, solver, options)
+        turns, root = find_targets(MappedMotion(level, ready.mapped), solver, options)
     if options.origin != "source":
         centre = root[0] if options.origin == "start" else (root.min(axis=0) + root.max(axis=0)) / 2
         root[:, [0, 2]] -= (centre - solver.skeleton.centres[0])[[0, 2]]
-    body = solve_targets(turned, root, solver)
+    body = solve_targets(turns, root, solver)
     frames = np.arange(len(root))
     face = None if motion.face is None else motion.face(frames / float(rate))
     return Captured(Animation(rate, frames, face, body, motion.name), motion, ready)
@@ -148,25 +215,6 @@ def _check_frames(motion: SkeletonMotion, rate: Fraction, limits: Limits) -> Non
         )
 
 
-def solve_targets(
-    turned: Mapping[str, Float64], root: Float64, solver: BapSolver, previous: Int32 | None = None
-) -> BodyTrack:
-    """Return the BAPs of targets: joint -> rotations (T, 3, 3) in the world, and the root's path (T, 3).
-
-    previous: BAPs (296,) of the frame before the first.
-    """
-
-    def matrices(rows: slice) -> Float64:
-        frames = np.zeros((rows.stop - rows.start, len(solver.skeleton), 4, 4))
-        frames[:, :, range(4), range(4)] = 1.0
-        for joint, rotation in turned.items():
-            frames[:, solver.skeleton.number(joint), :3, :3] = rotation[rows]
-        frames[:, 0, :3, 3] = root[rows]
-        return frames
-
-    return solve_track(solver, turned, len(root), matrices, previous)
-
-
 def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
     """Return whether the joints are the standard's, by name and hierarchy, and rest in the default posture.
 
@@ -187,8 +235,7 @@ def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
     if not all(upper in names and lower in names for upper, lower in LIMB_BONES):
         return False
     for upper, lower in LIMB_BONES:
-        source = motion.offsets[names.index(lower)]
-        body = skeleton.centres[skeleton.number(lower)] - skeleton.centres[skeleton.number(upper)]
+        source, body = motion.offsets[names.index(lower)], skeleton.bone(upper, lower)
         if not source @ body >= MIN_REST_COSINE * float(np.linalg.norm(source) * np.linalg.norm(body)) > 0:
             return False
     return True
@@ -197,21 +244,113 @@ def is_direct(motion: SkeletonMotion, skeleton: Skeleton) -> bool:
 def _direct_targets(
     motion: SkeletonMotion, skeleton: Skeleton, scale: float | None
 ) -> tuple[dict[str, Float64], Float64]:
-    """Return targets of a motion that `is_direct`, as `fba.capture._retarget.find_targets` does.
-
-    scale: as for `fba.capture.from_skeleton`.
-    """
-    numbers = [skeleton.number(name) for name in motion.names]
-    rest, (turned, _) = motion.rest() - motion.offsets[0], motion.world()
-    targets = {name: rotations.matrices(turned[:, column]) for column, name in enumerate(motion.names)}
-    default = skeleton.centres[numbers] - skeleton.centres[0]
+    """Return what `find_targets` does, of a motion that `is_direct`. scale: see `SkeletonOptions`."""
+    source = MappedMotion(motion, {name: number for number, name in enumerate(motion.names)})
+    rest = motion.rest() - motion.offsets[0]
+    default = skeleton.centres[[skeleton.number(name) for name in motion.names]] - skeleton.centres[0]
     metres = scale
     if metres is None:
         metres = float((rest * default).sum() / (rest * rest).sum())
         if float(np.abs(rest * metres - default).max()) >= MAX_SIZE_DIFFERENCE * float(np.ptp(default[:, 1])):
-            mapped = {name: column for column, name in enumerate(motion.names)}
-            metres = rest_alignment.scale(motion, mapped, skeleton) or metres
-    hips = [motion.names.index(f"{side}_hip") for side in "lr"]
+            metres = rest_alignment.scale(source, skeleton) or metres
+    hips = [source.mapped[f"{side}_hip"] for side in "lr"]
     # a body of other proportions has its hips where the source has them
     shift = (rest[hips] * metres - default[hips]).mean(axis=0)
-    return targets, motion.positions * metres + shift
+    return {name: source.rotations(name) for name in motion.names}, motion.positions * metres + shift
+
+
+def find_targets(
+    source: MappedMotion, solver: BapSolver, options: SkeletonOptions
+) -> tuple[dict[str, Float64], Float64]:
+    """Return targets of the body's joints and its root, in world axes, for a motion that was prepared.
+
+    They are joint -> rotations (T, 3, 3), and the positions of the root (T, 3) in metres.
+    """
+    skeleton = solver.skeleton
+    alignment = rest_alignment.align(source, skeleton)
+    turns = {
+        joint: source.rotations(joint if joint in source else ROOT) @ correction
+        for joint, correction in alignment.corrections.items()
+    }
+    ankles = {side: f"{side}_ankle" for side in "lr" if f"{side}_subtalar" in skeleton}
+    feet = {side: turns[ankle] for side, ankle in ankles.items() if ankle in turns}
+    targets = Targets(solver, source, alignment.aims, turns, feet)
+    _turn_pelvis(targets)
+    spine.spread(targets, options.groups, options.turns_same_joints)
+    turn_limbs(targets)
+    metres = _metres_per_unit(targets) if options.scale is None else options.scale
+    root = _root_positions(targets, metres)
+    if options.ground != "none":
+        root = plant_feet(targets, root, metres, options.ground, options.plant)
+    return targets.rotations, root
+
+
+def _turn_pelvis(targets: Targets) -> None:
+    """Turn the pelvis to where the hips are, in files in which joints between the two turn as well."""
+    source = targets.source
+    if "l_hip" not in source or "r_hip" not in source:
+        return
+    row = source.rest["l_hip"] - source.rest["r_hip"]
+    expected = source.rotations(ROOT) @ row
+    found = source.positions["l_hip"] - source.positions["r_hip"]
+    if np.abs(found - expected).max() <= MAX_HIP_OFFSET * np.linalg.norm(row):
+        return
+    apart = np.minimum(np.linalg.norm(expected, axis=1), np.linalg.norm(found, axis=1))
+    if not apart.min() > 0:
+        raise ModelError(
+            f"both hips are in one place in frame {int(np.argmin(apart))}, so the pelvis cannot be turned; "
+            "map other joints to the hips, or cut that frame"
+        )
+    turn = rotations.between_all(expected, found)
+    for joint in (ROOT, "sacroiliac"):
+        if joint in targets.rotations:
+            targets.rotations[joint] = turn @ targets.rotations[joint]
+
+
+def _metres_per_unit(targets: Targets) -> float:
+    """Return metres of the body for one unit of the source, from the lengths of limbs.
+
+    Warns (FbaWarning) if there is no limb to compare.
+    """
+    ratio = rest_alignment.scale(targets.source, targets.skeleton)
+    if ratio is not None:
+        return ratio
+    text = "the source has neither whole legs nor whole arms: its unit is unknown; taken as centimetres"
+    warnings.warn(
+        FbaWarning(text).with_remedies(Remedy("scale", "give another, in metres, with {}", "0.001")),
+        stacklevel=5,
+    )
+    return 0.01
+
+
+def _root_positions(targets: Targets, metres: float) -> Float64:
+    """Return positions (T, 3) of the root for which the middle of the hips is where the source's is."""
+    source, skeleton = targets.source, targets.skeleton
+    hips = [joint for joint in ("l_hip", "r_hip") if joint in source]
+    if len(hips) < 2 or "sacroiliac" not in skeleton:
+        return source.positions[ROOT] * metres
+    middle = np.mean([source.positions[joint] for joint in hips], axis=0) * metres
+    centres, number = skeleton.centres, skeleton.number
+    lower = centres[[number(joint) for joint in hips]].mean(axis=0) - centres[number("sacroiliac")]
+    pelvis = skeleton.bone(ROOT, "sacroiliac")
+    result: Float64 = middle - targets.rotations["sacroiliac"] @ lower - targets.rotations[ROOT] @ pelvis
+    return result
+
+
+def solve_targets(
+    turns: Mapping[str, Float64], root: Float64, solver: BapSolver, previous: Int32 | None = None
+) -> BodyTrack:
+    """Return the BAPs of targets: joint -> rotations (T, 3, 3) in the world, and the root's path (T, 3).
+
+    previous: BAPs (296,) of the frame before the first.
+    """
+
+    def matrices(rows: slice) -> Float64:
+        frames = np.zeros((rows.stop - rows.start, len(solver.skeleton), 4, 4))
+        frames[:, :, range(4), range(4)] = 1.0
+        for joint, turn in turns.items():
+            frames[:, solver.skeleton.number(joint), :3, :3] = turn[rows]
+        frames[:, 0, :3, 3] = root[rows]
+        return frames
+
+    return solve_track(solver, turns, len(root), matrices, previous)

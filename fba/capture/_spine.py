@@ -23,6 +23,7 @@ import numpy as np
 from fba import rotations
 from fba.arrays import Float64
 from fba.body import Skeleton
+from fba.capture._limbs.targets import Targets
 from fba.parameters import baps
 
 SHOULDERS = "vt1"
@@ -68,14 +69,14 @@ class _SourceSpine:
     """The source's spine, by heights on that of the body.
 
     anchors: heights of its joints. positions: of each, (T, 3). levels: heights at which rotations are known,
-    the middles of bones and both ends. turned: the rotation (T, 3, 3) at each. shoulders: the height at which
-    the clavicles begin.
+    the middles of bones and both ends. rotations: (T, 3, 3), at each. shoulders: the height at which the
+    clavicles begin.
     """
 
     anchors: list[float]
     positions: list[Float64]
     levels: list[float]
-    turned: list[Float64]
+    rotations: list[Float64]
     shoulders: float
 
     def rotation_between(self, low: float, high: float) -> Float64:
@@ -83,7 +84,7 @@ class _SourceSpine:
         middle = (low + high) / 2
         level = min(middle, self.shoulders) if low <= self.shoulders < high else middle
         upper, share = _place(self.levels, level)
-        return rotations.part(self.turned[upper - 1], self.turned[upper], share)
+        return rotations.part(self.rotations[upper - 1], self.rotations[upper], share)
 
     def position_at(self, level: float) -> Float64:
         """Return the source's position (T, 3) at a height."""
@@ -99,60 +100,51 @@ def _place(levels: list[float], level: float) -> tuple[int, float]:
     return upper, float(np.clip((level - low) / max(high - low, 1e-12), 0.0, 1.0))
 
 
-def _source_spine(
-    height: Mapping[str, float],
-    wanted: Mapping[str, Float64],
-    positions: Mapping[str, Float64],
-    anchors: list[str],
-) -> _SourceSpine:
-    """Return the source's spine. height: of the body's joints; the others as for `spread`."""
+def _source_spine(targets: Targets, anchors: list[str], height: Mapping[str, float]) -> _SourceSpine:
+    """Return the source's spine. anchors: its joints. height: of the body's joints."""
     levels = [height[joint] for joint in anchors]
     middles = [levels[0], *((low + high) / 2 for low, high in pairwise(levels)), levels[-1]]
-    turned = [wanted[anchors[0]], *(wanted[joint] for joint in anchors)]
+    turns = [targets.rotations[joint] for joint in (anchors[0], *anchors)]
     below_neck = (n for n in reversed(range(len(anchors))) if not anchors[n].startswith(ABOVE_SHOULDERS))
     chest = next(below_neck, 0)
     shoulders = height.get(SHOULDERS, 0.0)
     if middles[chest + 1] < shoulders < middles[min(chest + 2, len(middles) - 1)]:
         middles.insert(chest + 2, shoulders)
-        turned.insert(chest + 2, turned[chest + 1])
-    return _SourceSpine(levels, [positions[joint] for joint in anchors], middles, turned, shoulders)
+        turns.insert(chest + 2, turns[chest + 1])
+    positions = [targets.source.positions[joint] for joint in anchors]
+    return _SourceSpine(levels, positions, middles, turns, shoulders)
 
 
-def spread(
-    skeleton: Skeleton,
-    wanted: dict[str, Float64],
-    positions: Mapping[str, Float64],
-    anchors: list[str],
-    groups: int,
-    with_anchors: bool,
-) -> None:
-    """Replace the rotations of anchors in wanted by those of all vertebrae that turn.
+def spread(targets: Targets, groups: int, with_anchors: bool) -> None:
+    """Replace the targets of the spine's joints that the source has by those of all vertebrae that turn.
 
-    wanted: joint -> (T, 3, 3), rotation of the bone above it, or of the joint itself for the last. anchors:
-    joints of the spine that the source has, from the root upwards, at least two. positions: anchor -> (T, 3),
-    in the source. groups: number of the standard's groups. with_anchors: the anchors turn, too.
+    The targets are the rotation of the bone above each joint, for the last of the joint itself. groups:
+    number of the standard's groups. with_anchors: the joints that the source has turn, too.
     """
+    skeleton, turns = targets.skeleton, targets.rotations
     chain = joints(skeleton)
-    first, last = chain.index(anchors[0]), chain.index(anchors[-1])
+    anchors = [joint for joint in chain if joint in targets.source]
+    if not groups or len(anchors) < 2:
+        return
     turning_joints = {*turning(skeleton, groups), *(anchors if with_anchors else ())}
-    free = [joint for joint in chain[first + 1 : last + 1] if joint in turning_joints]
+    between = chain[chain.index(anchors[0]) + 1 : chain.index(anchors[-1]) + 1]
+    free = [joint for joint in between if joint in turning_joints]
     if not free:
         return
     height = dict(zip(chain, heights(skeleton, chain).tolist(), strict=True))
-    source = _source_spine(height, wanted, positions, anchors)
+    source = _source_spine(targets, anchors, height)
     pinned = list(anchors if groups >= GROUPS or with_anchors else [anchors[0], *free])
     if pinned[-1] != anchors[-1]:
         pinned.append(anchors[-1])
-    head = wanted[anchors[-1]]
+    head = turns[anchors[-1]]
     for joint in anchors[1:]:
-        wanted.pop(joint, None)
+        turns.pop(joint, None)
     for low, high in pairwise(pinned):
         between = chain[chain.index(low) + 1 : chain.index(high)]
-        path = [low, *(joint for joint in between if joint in free), high]
-        wanted |= _bend(path, skeleton, height, source)
-    wanted[anchors[-1]] = head
+        turns |= _bend([low, *(joint for joint in between if joint in free), high], skeleton, height, source)
+    turns[anchors[-1]] = head
     if pinned != anchors:
-        _correct_directions(skeleton, wanted, positions, anchors, free)
+        _correct_directions(targets, anchors, free)
 
 
 def _bend(
@@ -171,26 +163,22 @@ def _bend(
     return {joint: correction @ turn for joint, turn in zip(path[:-1], bent, strict=True)}
 
 
-def _correct_directions(
-    skeleton: Skeleton,
-    wanted: dict[str, Float64],
-    positions: Mapping[str, Float64],
-    anchors: list[str],
-    free: list[str],
-) -> None:
+def _correct_directions(targets: Targets, anchors: list[str], free: list[str]) -> None:
     """Turn free joints a little more, so that the lines between anchors point as the source's do."""
-    chain = joints(skeleton)
-    centres = skeleton.centres[[skeleton.number(joint) for joint in chain]]
+    chain, positions = joints(targets.skeleton), targets.source.positions
+    centres = targets.skeleton.centres[[targets.skeleton.number(joint) for joint in chain]]
     ends = [chain.index(joint) for joint in anchors]
     turning_numbers = sorted({ends[0], *(chain.index(joint) for joint in free if joint != anchors[-1])})
-    parts = np.stack([wanted[chain[number]] for number in turning_numbers])
+    parts = np.stack([targets.rotations[chain[number]] for number in turning_numbers])
     lines = np.stack([positions[above] - positions[below] for below, above in pairwise(anchors)])
     for begin in range(0, parts.shape[1], CHUNK_FRAMES):
         chunk = slice(begin, begin + CHUNK_FRAMES)
         parts[:, chunk] = _refine(
             list(parts[:, chunk]), turning_numbers, centres, ends, list(lines[:, chunk])
         )
-    wanted.update({chain[number]: part for number, part in zip(turning_numbers, parts, strict=True)})
+    targets.rotations.update(
+        {chain[number]: part for number, part in zip(turning_numbers, parts, strict=True)}
+    )
 
 
 def _refine(

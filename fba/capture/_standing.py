@@ -13,6 +13,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.body import ROOT
+from fba.capture.motion import MappedMotion
 from fba.rotations import degrees_between, unit
 
 MAX_ANGLES = {
@@ -77,22 +78,21 @@ class Stance:
         return f"{part} {self.angles[part][row]:.0f} degrees"
 
 
-def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
-    """Return how poses stand. positions: (T, J, 3), in any axes. mapped: body's joint -> source's joint."""
-    axes = _trunk_axes(positions, mapped)
+def measure(positions: Mapping[str, Float64]) -> Stance:
+    """Return how poses stand. positions: joint of the body -> (T, 3), in any axes."""
+    axes = _trunk_axes(positions)
 
     def bone(start: str, end: str) -> Float64 | None:
         """Return unit directions (T, 3) between joints: their parts along left, up and ahead."""
-        if start not in mapped or end not in mapped:
+        if start not in positions or end not in positions:
             return None
-        line = positions[:, mapped[end]] - positions[:, mapped[start]]
-        return unit((axes @ line[:, :, None])[:, :, 0])
+        return unit((axes @ (positions[end] - positions[start])[:, :, None])[:, :, 0])
 
     angles: dict[str, Float64] = {}
 
     def add(part: str, angle: Float64) -> None:
         """Keep the larger angle of a part."""
-        angles[part] = np.maximum(angles.get(part, np.zeros(len(positions))), angle)
+        angles[part] = np.maximum(angles.get(part, np.zeros(len(axes))), angle)
 
     left, up, ahead = np.eye(3)
     limbs = {}
@@ -120,25 +120,31 @@ def measure(positions: Float64, mapped: Mapping[str, int]) -> Stance:
     return Stance(axes[:, 1], axes[:, 0], angles)
 
 
-def _trunk_axes(positions: Float64, mapped: Mapping[str, int]) -> Float64:
+def measure_rest(source: MappedMotion) -> Stance:
+    """Return how a source stands in its rest pose, T = 1."""
+    return measure({joint: position[None] for joint, position in source.rest.items()})
+
+
+def _trunk_axes(positions: Mapping[str, Float64]) -> Float64:
     """Return rows (T, 3, 3): left, up and ahead, as the hips and the trunk above them show."""
 
     def middle(*joints: str) -> Float64 | None:
-        numbers = [mapped[joint] for joint in joints if joint in mapped]
-        result: Float64 | None = positions[:, numbers].mean(axis=1) if len(numbers) == len(joints) else None
+        if not all(joint in positions for joint in joints):
+            return None
+        result: Float64 = np.mean([positions[joint] for joint in joints], axis=0)
         return result
 
     pairs = [
-        positions[:, mapped[f"l_{joint}"]] - positions[:, mapped[f"r_{joint}"]]
+        positions[f"l_{joint}"] - positions[f"r_{joint}"]
         for joint in ("hip", "shoulder", "knee")
-        if f"l_{joint}" in mapped and f"r_{joint}" in mapped
+        if f"l_{joint}" in positions and f"r_{joint}" in positions
     ]
     left = next((pair for pair in pairs if np.linalg.norm(pair, axis=1).min() > 0), None)
     if left is None:
-        left = pairs[0] if pairs else np.tile([1.0, 0.0, 0.0], (len(positions), 1))
+        left = pairs[0] if pairs else np.broadcast_to([1.0, 0.0, 0.0], positions[ROOT].shape)
     left = unit(left)
     below = middle("l_hip", "r_hip")
-    below = positions[:, mapped[ROOT]] if below is None else below
+    below = positions[ROOT] if below is None else below
     tops = [middle("l_shoulder", "r_shoulder"), middle("vc7"), middle("skullbase")]
     above = next((top for top in tops if top is not None), None)
     if above is None:
@@ -148,13 +154,3 @@ def _trunk_axes(positions: Float64, mapped: Mapping[str, int]) -> Float64:
     up = above - below
     up = unit(up - left * np.sum(up * left, axis=1, keepdims=True))
     return np.stack([left, up, np.cross(left, up)], axis=1)
-
-
-def row_turn(frames: Float64, row: Float64, at_rest: Float64) -> float:
-    """Return degrees between a row as a joint sees it, on average, and the same row in the rest pose.
-
-    frames: (T, 3, 3), rotations of the joint against the rest pose. row: (T, 3), in the world, from the right
-    hip to the left one, or the same of shoulders. at_rest: (3,). 0 if the row has no length.
-    """
-    mean = np.einsum("tij,ti->j", frames, unit(row))
-    return float(degrees_between(mean, at_rest))

@@ -15,13 +15,12 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64, Int32
 from fba.body import BapSolver
-from fba.capture import _retarget as retarget
-from fba.capture._skeleton import solve_targets
+from fba.capture._skeleton import SkeletonOptions, find_targets, solve_targets
 from fba.capture.blendshapes.combination import RADIAN
 from fba.capture.blendshapes.conversion import EYE_FAPS, HEAD_FAPS, convert_rows
 from fba.capture.blendshapes.shape_table import largest_amounts, shape_faps
-from fba.capture.motion import SkeletonMotion
-from fba.capture.preparation import prepare, rest_on_frame
+from fba.capture.motion import MappedMotion, SkeletonMotion
+from fba.capture.preparation import prepare
 from fba.face import arkit_names
 from fba.limits import DEFAULT_LIMITS
 from fba.parameters import FAP_COUNT, fap_numbers
@@ -34,7 +33,7 @@ CHUNK_FRAMES = 4096
 """Number of frames that are made at once, which limits the memory for those of a long gap."""
 CONTEXT_FRAMES = 8
 """Number of earlier frames that are converted again with the new ones, so that joints move on smoothly."""
-LIVE_OPTIONS = retarget.SkeletonOptions(ground="none", plant=False)
+LIVE_OPTIONS = SkeletonOptions(ground="none", plant=False)
 """Options of poses that come one after another: where the ground is, only later poses show."""
 
 Row = tuple[float, list[Float64]]
@@ -162,11 +161,12 @@ class LiveSkeleton:
             positions = np.concatenate([self._context[1], positions])
         self._context = rotations[-CONTEXT_FRAMES:], positions[-CONTEXT_FRAMES:]
         poses = replace(self._source, rotations=rotations, positions=positions, rate=rate)
-        turned, root = retarget.find_targets(self._at_rest(poses), self._mapped, self._solver, LIVE_OPTIONS)
-        last = {joint: rows[-new:] for joint, rows in turned.items()}
+        source = MappedMotion(self._at_rest(poses), self._mapped)
+        turns, root = find_targets(source, self._solver, LIVE_OPTIONS)
+        last = {joint: rows[-new:] for joint, rows in turns.items()}
         track = solve_targets(last, root[-new:], self._solver, self._previous)
         self._previous = track.values[-1]
         return track
 
     def _at_rest(self, poses: SkeletonMotion) -> SkeletonMotion:
-        return rest_on_frame(poses, self._source, 0) if self._t_pose else poses
+        return poses.with_rest_of(self._source, 0) if self._t_pose else poses

@@ -162,6 +162,53 @@ class SkeletonMotion:
         turned.flags.writeable = positions.flags.writeable = False
         return turned, positions
 
+    def joint_rotations(self, joint: int, rows: slice | Intp = slice(None)) -> Float64:
+        """Return the rotations (T, 3, 3) of a joint in the world, against the rest pose, in some frames."""
+        return rotations.matrices(self.world()[0][rows, joint])
+
+    def turn_axes(self, turn: Float64) -> SkeletonMotion:
+        """Return the same motion in other axes of the world. turn: (3, 3), from the old axes to the new."""
+        quaternion = rotations.quaternions(turn[None])[0]
+        inverse = quaternion * [1, -1, -1, -1]
+        local = rotations.multiply(
+            rotations.multiply(np.broadcast_to(quaternion, self.rotations.shape), self.rotations),
+            np.broadcast_to(inverse, self.rotations.shape),
+        )
+        return replace(
+            self,
+            offsets=self.offsets @ turn.T,
+            rotations=local / np.linalg.norm(local, axis=-1, keepdims=True),
+            positions=self.positions @ turn.T,
+            end_offsets=self.end_offsets @ turn.T,
+            axes=rotations.quaternions(turn @ rotations.matrices(self.axes)),
+        )
+
+    def with_rest(self, rest: Float64) -> SkeletonMotion:
+        """Return the same motion with another rest pose: world rotations (J, 3, 3) of the joints."""
+        turned, _ = self.world()
+        inverse = rotations.quaternions(np.swapaxes(rest, 1, 2))
+        world = rotations.multiply(turned, np.broadcast_to(inverse, turned.shape))
+        local = np.array(world)
+        offsets = np.array(self.offsets)
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                local[:, joint] = rotations.multiply(world[:, parent] * [1, -1, -1, -1], world[:, joint])
+                offsets[joint] = rest[parent] @ self.offsets[joint]
+        local /= np.linalg.norm(local, axis=-1, keepdims=True)
+        ends = [rest[p] @ offset for p, offset in zip(self.end_parents, self.end_offsets, strict=True)]
+        return replace(
+            self,
+            offsets=offsets,
+            rotations=local,
+            end_offsets=np.array(ends).reshape(-1, 3),
+            axes=rotations.quaternions(rest @ rotations.matrices(self.axes)),
+        )
+
+    def with_rest_of(self, other: SkeletonMotion, frame: int) -> SkeletonMotion:
+        """Return the same motion that rests as another motion of its skeleton, or itself, is in a frame."""
+        pose, _ = other.select(slice(frame, frame + 1)).world()
+        return self.with_rest(rotations.matrices(pose[0]))
+
     def descendants(self, joint: int) -> list[int]:
         """Return a joint and all joints below it, parents first."""
         found = [joint]
@@ -177,6 +224,40 @@ class SkeletonMotion:
             if parent >= 0:
                 positions[joint] += positions[parent]
         return positions
+
+
+@dataclass(frozen=True, eq=False)
+class MappedMotion:
+    """A motion whose joints are matched with those of the body.
+
+    mapped: joint of the body -> number of the motion's joint.
+    """
+
+    motion: SkeletonMotion
+    mapped: Mapping[str, int]
+
+    def __contains__(self, joint: str) -> bool:
+        return joint in self.mapped
+
+    @cached_property
+    def positions(self) -> dict[str, Float64]:
+        """Positions (T, 3) in the world, by joint of the body."""
+        positions = self.motion.world()[1]
+        return {joint: positions[:, number] for joint, number in self.mapped.items()}
+
+    @cached_property
+    def rest(self) -> dict[str, Float64]:
+        """Positions (3,) in the rest pose, by joint of the body."""
+        rest = self.motion.rest()
+        return {joint: rest[number] for joint, number in self.mapped.items()}
+
+    def rotations(self, joint: str, rows: slice | Intp = slice(None)) -> Float64:
+        """Return `SkeletonMotion.joint_rotations` of a joint of the body."""
+        return self.motion.joint_rotations(self.mapped[joint], rows)
+
+    def select(self, rows: slice | Intp) -> MappedMotion:
+        """Return some frames, see `SkeletonMotion.select`."""
+        return MappedMotion(self.motion.select(rows), self.mapped)
 
 
 def read_axis(name: str) -> Float64:

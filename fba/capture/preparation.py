@@ -17,12 +17,11 @@ from fba.arrays import Float64
 from fba.body import ROOT, Skeleton
 from fba.capture import _rest_alignment as rest_alignment
 from fba.capture import _standing as standing
-from fba.capture import matching
 from fba.capture._rest_correction import correct_rest
-from fba.capture._rest_from_motion import rest_from_motion, with_rest
-from fba.capture._up_axis import UPS, find_up_axis, find_upright, nearest_axis, turn_axes
-from fba.capture.bones import check_extent, find_bones, refuse_swapped_sides
-from fba.capture.motion import SkeletonMotion, read_axis
+from fba.capture._rest_from_motion import rest_from_motion
+from fba.capture._up_axis import UPS, find_up_axis, nearest_axis
+from fba.capture.bones import GIVE_JOINTS, check_extent, check_root, find_bones, refuse_swapped_sides
+from fba.capture.motion import MappedMotion, SkeletonMotion, read_axis
 from fba.choices import SignedUpAxis
 from fba.errors import FbaWarning, ModelError, Remedy
 
@@ -40,6 +39,7 @@ MAX_ROW_TURN = {"hip": 25.0, "shoulder": 45.0}
 above them. In real files it is up to 6 for hips, up to 8 for shoulders."""
 MAX_ARM_TILT = 10.0
 """Largest angle, in degrees, between an arm in a T-pose and the side."""
+Y = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,52 +88,43 @@ def prepare(
         raise ModelError(
             f"the motion has {len(motion)} frames, from 0; there is no frame {rest} to rest in"
         ).with_remedies(Remedy("rest", "choose one of these with {}", "0"))
-    matching.check_root(skeleton)
+    check_root(skeleton)
     check_extent(motion)
     bones = find_bones(motion, joints, skeleton)
-    mapped = bones.joints
-    confidence, reasons = {"bones": bones.confidence}, {"bones": bones.reason}
-    sample = motion.select(motion.spread())
-    quaternions, positions = sample.world()
-    at_rest = standing.measure(motion.rest()[None], mapped)
-    found_up = find_up_axis(motion, positions, mapped, at_rest, up)
-    axis, confidence["up"], reasons["up"] = found_up.axis, found_up.confidence, found_up.reason
-    turn = rotations.between(read_axis(axis), np.array([0.0, 1.0, 0.0]))
-    level = motion if axis == "+y" else turn_axes(motion, turn)
+    source = MappedMotion(motion, bones.joints)
+    sample = source.select(motion.spread())
+    at_rest = standing.measure_rest(source)
+    found_up = find_up_axis(source, sample, at_rest, up)
     if joints is None:
-        refuse_swapped_sides(sample, mapped)
-    chosen, confidence["rest"], reasons["rest"] = _choose_rest(
-        motion, quaternions, positions, mapped, at_rest, rest
-    )
+        refuse_swapped_sides(sample)
+    chosen, sure, reason = _choose_rest(sample, at_rest, rest)
+    turn = rotations.between(read_axis(found_up.axis), Y)
+    level = motion if found_up.axis == "+y" else motion.turn_axes(turn)
     if chosen == "motion":
-        found = rest_from_motion(level, mapped, skeleton)
-        level, confidence["rest"] = found.motion, found.confidence
-        reasons["rest"] = f"{reasons['rest']}; worked out from the motion: {found.reason}"
-    elif chosen == "file":
-        rest_up = turn @ nearest_axis(at_rest.up[0])
-        if rest_up[1] < 0.5:
-            back = rotations.between(rest_up, np.array([0.0, 1.0, 0.0]))
-            level = with_rest(level, np.broadcast_to(back, (len(level.names), 3, 3)))
+        found = rest_from_motion(MappedMotion(level, bones.joints), skeleton)
+        level, sure = found.motion, found.confidence
+        reason = f"{reason}; worked out from the motion: {found.reason}"
     else:
-        frame = 0 if chosen == "first" else int(rest)
-        level = rest_on_frame(level, level, frame)
-        if chosen != "first":
-            chosen = f"frame {frame}"
-    if chosen != "motion":
-        level = correct_rest(level, mapped)
-    result = Preparation(level, mapped, bones.family, chosen, axis, confidence, reasons)
+        if chosen == "file":
+            rest_up = turn @ nearest_axis(at_rest.up[0])
+            if rest_up[1] < 0.5:
+                back = rotations.between(rest_up, Y)
+                level = level.with_rest(np.broadcast_to(back, (len(level.names), 3, 3)))
+        else:
+            frame = 0 if chosen == "first" else int(rest)
+            level = level.with_rest_of(level, frame)
+            if chosen != "first":
+                chosen = f"frame {frame}"
+        level = correct_rest(MappedMotion(level, bones.joints))
+    confidence = {"bones": bones.confidence, "up": found_up.confidence, "rest": sure}
+    reasons = {"bones": bones.reason, "up": found_up.reason, "rest": reason}
+    result = Preparation(level, bones.joints, bones.family, chosen, found_up.axis, confidence, reasons)
     _refuse_doubt(result, joints is not None, rest != "auto", up != "auto")
     if found_up.doubt:
-        warning = FbaWarning(f"up is taken to be {axis}: {found_up.doubt}")
+        warning = FbaWarning(f"up is taken to be {found_up.axis}: {found_up.doubt}")
         remedy = Remedy("up", "if another axis points up, say which with {}", f"'{found_up.instead}'")
         warnings.warn(warning.with_remedies(remedy), stacklevel=3)
     return result
-
-
-def rest_on_frame(motion: SkeletonMotion, other: SkeletonMotion, frame: int) -> SkeletonMotion:
-    """Return a motion whose rest pose is a frame of another motion of its skeleton, or of itself."""
-    row = other.select(slice(frame, frame + 1))
-    return with_rest(motion, rotations.matrices(row.world()[0][0]))
 
 
 def _refuse_doubt(result: Preparation, given_joints: bool, given_rest: bool, given_up: bool) -> None:
@@ -141,7 +132,7 @@ def _refuse_doubt(result: Preparation, given_joints: bool, given_rest: bool, giv
     give_up = Remedy("up", "say which axis points up with {}", "'+y'")
     give_rest = Remedy("rest", "if a frame shows a T-pose, or somebody who stands, say which with {}", "0")
     for what, given, finding, remedy in (
-        ("bones", given_joints, "which joint is which is not clear", matching.GIVE_JOINTS),
+        ("bones", given_joints, "which joint is which is not clear", GIVE_JOINTS),
         ("up", given_up, "which way is up is not clear", give_up),
         ("rest", given_rest, "the rest pose is not clear", give_rest),
     ):
@@ -152,65 +143,54 @@ def _refuse_doubt(result: Preparation, given_joints: bool, given_rest: bool, giv
             ).with_remedies(remedy)
 
 
-def _choose_rest(
-    motion: SkeletonMotion,
-    quaternions: Float64,
-    positions: Float64,
-    mapped: Mapping[str, int],
-    at_rest: standing.Stance,
-    rest: str | int,
-) -> tuple[str, float, str]:
-    """Return the rest pose to use ("file", "first", "motion" or `rest`), the confidence and a reason.
-
-    quaternions, positions: (T, J, 4), (T, J, 3), of the source in the world.
-    """
+def _choose_rest(sample: MappedMotion, at_rest: standing.Stance, rest: str | int) -> tuple[str, float, str]:
+    """Return the rest pose to use ("file", "first", "motion" or `rest`), the confidence and a reason."""
     if rest != "auto":
         return str(rest), 1.0, "as given"
     distance = float(at_rest.distance[0])
     possible = bool(at_rest.possible[0])
-    if possible and motion.posed:
-        relative = motion.rest() - motion.rest()[mapped[ROOT]]
-        size = float(np.ptp(relative, axis=0).max())
-        frames = positions - positions[:, [mapped[ROOT]]]
-        same = (
-            len(frames) > 1
-            and float(np.abs(frames - relative).max(axis=(1, 2)).min()) < MAX_POSE_DIFFERENCE * size
-        )
-        possible = distance <= MAX_POSED_DISTANCE and not same
+    if possible and sample.motion.posed:
+        possible = distance <= MAX_POSED_DISTANCE and not _rests_in_a_frame(sample)
         why = "the nodes' own pose is one of the motion"
     else:
         why = f"nobody can stand as in the file's rest pose ({at_rest.worst(0)})"
     if possible:
-        turned = _find_turned_row(motion, quaternions, positions, mapped)
+        turned = _find_turned_row(sample)
         if turned is None:
             return "file", max(0.6, 1.0 - distance / 50.0), "the file's own rest pose is a person's"
         why = f"the {turned[0]} are {turned[1]:.0f} degrees from the file's rest pose on average"
-    first = standing.measure(positions[:1], mapped)
-    if (
-        bool(first.possible[0])
-        and float(first.distance[0]) <= MAX_FIRST_FRAME_DISTANCE
-        and _arms_out(positions[0], mapped, first)
-    ):
+    first = standing.measure({joint: places[:1] for joint, places in sample.positions.items()})
+    distance = float(first.distance[0])
+    if bool(first.possible[0]) and distance <= MAX_FIRST_FRAME_DISTANCE and _arms_out(sample, first.left[0]):
         return "first", 0.9, f"{why}; the first frame is a T-pose"
     return "motion", 1.0, why
 
 
-def _find_turned_row(
-    motion: SkeletonMotion, quaternions: Float64, positions: Float64, mapped: Mapping[str, int]
-) -> tuple[str, float] | None:
+def _rests_in_a_frame(sample: MappedMotion) -> bool:
+    """Return whether the rest pose is a pose of the motion."""
+    root, rest, positions = sample.mapped[ROOT], sample.motion.rest(), sample.motion.world()[1]
+    relative = rest - rest[root]
+    size = float(np.ptp(relative, axis=0).max())
+    differences = np.abs(positions - positions[:, [root]] - relative).max(axis=(1, 2))
+    return len(differences) > 1 and float(differences.min()) < MAX_POSE_DIFFERENCE * size
+
+
+def _find_turned_row(sample: MappedMotion) -> tuple[str, float] | None:
     """Return the row that is turned from the rest pose, hips or shoulders, and by how many degrees; or None.
 
     Rotations that were fitted to positions of joints may turn the pelvis aside and its hips back. The file's
     rest pose then says nothing.
     """
-    at_rest = motion.rest()
     for joint, most in MAX_ROW_TURN.items():
-        ends = [mapped[name] for name in (f"l_{joint}", f"r_{joint}") if name in mapped]
-        if len(ends) < 2 or (above := _common_parent(motion, *ends)) < 0:
+        left, right = f"l_{joint}", f"r_{joint}"
+        if left not in sample or right not in sample:
             continue
-        row = at_rest[ends[0]] - at_rest[ends[1]]
-        frames = rotations.matrices(quaternions[:, above])
-        turn = standing.row_turn(frames, positions[:, ends[0]] - positions[:, ends[1]], row)
+        above = _common_parent(sample.motion, sample.mapped[left], sample.mapped[right])
+        if above < 0:
+            continue
+        row = rotations.unit(sample.positions[left] - sample.positions[right])
+        seen = np.einsum("tij,ti->j", sample.motion.joint_rotations(above), row)  # on average, as from above
+        turn = float(rotations.degrees_between(seen, sample.rest[left] - sample.rest[right]))
         if turn > most:
             return f"{joint}s", turn
     return None
@@ -223,13 +203,14 @@ def _common_parent(motion: SkeletonMotion, first: int, second: int) -> int:
     return first
 
 
-def _arms_out(positions: Float64, mapped: Mapping[str, int], stance: standing.Stance) -> bool:
-    """Return whether both arms point straight to the sides."""
+def _arms_out(sample: MappedMotion, left: Float64) -> bool:
+    """Return whether both arms point straight to the sides in the first frame. left: (3,), of the trunk."""
     for side, sign in (("l", 1.0), ("r", -1.0)):
-        if f"{side}_shoulder" not in mapped or f"{side}_wrist" not in mapped:
+        shoulder, wrist = f"{side}_shoulder", f"{side}_wrist"
+        if shoulder not in sample or wrist not in sample:
             return False
-        arm = rotations.unit(positions[mapped[f"{side}_wrist"]] - positions[mapped[f"{side}_shoulder"]])
-        if float(arm @ stance.left[0]) * sign < np.cos(np.radians(MAX_ARM_TILT)):
+        arm = rotations.unit(sample.positions[wrist][0] - sample.positions[shoulder][0])
+        if float(arm @ left) * sign < np.cos(np.radians(MAX_ARM_TILT)):
             return False
     return True
 
@@ -252,8 +233,9 @@ class Rest:
 def find_rest(motion: SkeletonMotion, skeleton: Skeleton, joints: Mapping[str, str] | None = None) -> Rest:
     """Return how a skeleton rests. joints: as for `from_skeleton`. ModelError as `from_skeleton`."""
     mapped = find_bones(motion, joints, skeleton).joints
-    upright = find_upright(motion, mapped)
-    alignment = rest_alignment.align(turn_axes(motion, upright), mapped, skeleton)
+    axis = nearest_axis(standing.measure_rest(MappedMotion(motion, mapped)).up[0])
+    upright = rotations.between(axis, Y)
+    alignment = rest_alignment.align(MappedMotion(motion.turn_axes(upright), mapped), skeleton)
     ahead = alignment.corrections["sacroiliac"].T
     corrections = {joint: ahead @ correction for joint, correction in alignment.corrections.items()}
     turn = ahead @ upright

@@ -189,7 +189,7 @@ def check_clip(reading: Reading, files: Iterable[Path]) -> None:
     if reading.clip is None:
         return
     formats = {find_format(file, reading.format) for file in files if str(file) != "-"}
-    if formats and all(entry.list_clips is None for entry in formats):
+    if formats and all(entry.describe is None for entry in formats):
         names = " and ".join(sorted(entry.name.upper() for entry in formats))
         raise click.UsageError(f"--clip is for glTF, which may hold several animations, not for {names}")
 

@@ -210,5 +210,5 @@ def read_capture(path: Path, reading: Reading) -> Any:
         reader = format_of(file, reading.format)
         read = reader.read_motion or reader.read_face
         assert read is not None  # the caller names captures only
-        options: dict[str, Any] = {} if reader.list_clips is None else {"clip": reading.clip}
+        options: dict[str, Any] = {} if reader.describe is None else {"clip": reading.clip}
         return read(file, limits=reading.limit, **options)

@@ -24,8 +24,7 @@ from fba.source import Path, read_head
 if TYPE_CHECKING:
     from fba.capture import Captured, FaceCapture, SkeletonMotion
     from fba.codec import StreamInfo
-    from fba.formats.gltf.bodies import PersonInfo
-    from fba.formats.gltf.clips import ClipInfo
+    from fba.formats.gltf.bodies import Content
 
 COMMON_SUFFIXES = (".csv", ".json", ".txt")
 """Suffixes that say nothing about the content."""
@@ -67,8 +66,7 @@ class Format:
     may hold any of these. `read` makes animations of motions and faces. kind: of the capture, see
     `fba.capture.capture_options`; "" for files of FAPs and BAPs.
 
-    list_clips: describes the animations of a file, for formats that hold several; `clip` of `read` chooses.
-    describe_person: describes the person in a file without an animation.
+    describe: describes a file that may hold several animations, of which `clip` of `read` chooses, or none.
     """
 
     name: str
@@ -82,8 +80,7 @@ class Format:
     read_face: Callable[..., FaceCapture] | None = None
     read_person: Callable[..., Captured] | None = None
     kind: str = ""
-    list_clips: Callable[..., tuple[ClipInfo, ...]] | None = None
-    describe_person: Callable[..., PersonInfo | None] | None = None
+    describe: Callable[..., Content] | None = None
     written: str = ""
 
     def read(self, path: Path, **options: Any) -> Animation:
@@ -203,8 +200,7 @@ _FORMATS = (
         "glTF 2.0: read, an animated skeleton; written, a skinned person",
         _lazy("gltf._reader", "sniff"), _lazy("gltf._writer", "write"),
         read_person=_lazy("gltf._reader", "read_person"), read_motion=_lazy("gltf._reader", "read_motion"),
-        kind="skeleton", list_clips=_lazy("gltf.clips", "list_clips"),
-        describe_person=_lazy("gltf.bodies", "describe_person"), written="glTF 2.0, a skinned person",
+        kind="skeleton", describe=_lazy("gltf.bodies", "describe"), written="glTF 2.0, a skinned person",
     ),
     Format(
         "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",

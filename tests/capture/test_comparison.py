@@ -14,11 +14,11 @@ from capture_bodies import motion
 from fba import Animation, FaceTrack
 from fba.body import Skeleton
 from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture.bones import map_joints
 from fba.capture.comparison import Comparison, Difference, bounds, compare, find_sticks, find_up
 from fba.capture.comparison._figure import Figure
 from fba.capture.comparison._path_measures import floors
 from fba.capture.comparison._path_measures import jumps as measure_jumps
-from fba.capture.matching import map_joints
 from fba.errors import ModelError
 from fba.parameters import bap_numbers
 

@@ -11,7 +11,8 @@ from test_from_skeleton import NAMES, REAL
 
 from capture_bodies import bone_errors, limb_bones, motion
 from fba.body import BapSolver, Skeleton
-from fba.capture import SkeletonMotion, from_skeleton, matching
+from fba.capture import SkeletonMotion, from_skeleton
+from fba.capture.bones import match
 from fba.formats.bvh import _reader as reader
 
 HINGED = ("shoulder", "elbow", "hip", "knee")
@@ -70,7 +71,7 @@ def test_elbow_beyond_straight_and_back() -> None:
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_real_limbs_do_not_jump(shared: Path, name: str) -> None:
     captured = reader.read_motion(shared / "data" / name)
-    _, mapped = matching.match(captured.names)
+    _, mapped = match(captured.names)
     found = joint_steps(captured)
     for side in "lr":
         for joint in HINGED:

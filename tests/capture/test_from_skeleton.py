@@ -13,9 +13,10 @@ from scipy.spatial.transform import Rotation
 import fba
 from capture_bodies import ARM, bone_errors, limb_bones, motion, source_places
 from fba import Animation
-from fba.body import BapSolver, BodyModel, GroundedPoser, Skeleton
-from fba.body.footing import lowest_sole
-from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
+from fba.body import BapSolver, BodyModel, Skeleton
+from fba.body.footing import GroundedPoser, lowest_sole
+from fba.capture import SkeletonMotion, from_skeleton, retarget_report
+from fba.capture.bones import match
 from fba.capture.comparison._figure import find_up, result_figure, source_figure
 from fba.capture.comparison._measurement import sole_heights, source_scale
 from fba.capture.comparison._standing import find_floor, find_standing
@@ -185,13 +186,13 @@ def test_only_mapped_joints_are_sent() -> None:
 
 @pytest.mark.parametrize("prefix", ["mixamorig:", "mixamorig_", "Bob 1:Bip ", "CHARACTER-"])
 def test_names_with_prefixes(prefix: str) -> None:
-    family, found = matching.match(motion("T", prefix=prefix).names)
+    family, found = match(motion("T", prefix=prefix).names)
     assert family == "arm"
     assert len(found) == len(NAMES)
 
 
 def test_names_in_another_case() -> None:
-    _, found = matching.match([name.upper().replace("LEFT", "left_") for name in motion().names])
+    _, found = match([name.upper().replace("LEFT", "left_") for name in motion().names])
     assert found["l_elbow"] == motion().names.index("LeftForeArm")
 
 
@@ -317,7 +318,7 @@ def standing_soles(captured: SkeletonMotion, mapped: dict[str, int], animation: 
 def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     family, rate, frames = REAL[name]
     captured = reader.read_motion(shared / "data" / name)
-    found, mapped = matching.match(captured.names)
+    found, mapped = match(captured.names)
     assert (found, captured.rate, len(captured)) == (family, rate, frames)
     animation = from_skeleton(captured)
     bones = limb_bones({joint: captured.names[number] for joint, number in mapped.items()})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -10,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from capture_bodies import motion
 from fba.body import BapSolver, Skeleton
-from fba.capture import from_skeleton
+from fba.capture import SkeletonMotion, from_skeleton
 from fba.capture._bone_words import read
-from fba.capture._named_bones import _fingers
+from fba.capture._named_bones import NamedJoints
 from fba.capture.bones import find_bones
 from fba.capture.comparison import find_up
 from fba.capture.preparation import prepare
@@ -166,8 +167,10 @@ def test_the_middle_of_a_finger_is_no_middle_finger() -> None:
         for number, part in enumerate(("base", "mid", "tip")):
             parents.append(0 if not number else len(names) - 1)
             names.append(f"L_{finger}_{part}_jnt")
-    meanings = [read(name) for name in names]
-    found = _fingers("l", range(len(names)), names, meanings, np.array(parents))
+    unturned = np.tile([1.0, 0.0, 0.0, 0.0], (1, len(names), 1))
+    offsets = np.zeros((len(names), 3))
+    hand = SkeletonMotion(tuple(names), np.array(parents), offsets, unturned, np.zeros((1, 3)), Fraction(25))
+    found = NamedJoints(hand).fingers("l", 0)
     assert {names[number] for joint, number in found.items() if "ring" in joint} == {
         "L_ring_base_jnt", "L_ring_mid_jnt",
     }  # fmt: skip

@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 from capture_bodies import motion
 from fba.animation import Animation, FaceTrack
 from fba.body import BapSolver, Skeleton
-from fba.capture import SkeletonMotion, from_skeleton, matching, retarget_report
+from fba.capture import SkeletonMotion, from_skeleton, retarget_report
 from fba.capture import _skeleton as skeleton
+from fba.capture.bones import families, match
 from fba.errors import ModelError
 from fba.parameters import bap_numbers, baps, joints
 
@@ -249,7 +250,7 @@ FAMILIES = {
 def test_families_of_names(family: str) -> None:
     text, expected = FAMILIES[family]
     names = text.split("|") if "|" in text else text.split()
-    found, mapped = matching.match(names)
+    found, mapped = match(names)
     assert found == family
     by_source = {names[number]: joint for joint, number in mapped.items()}
     for source, joint in expected.items():
@@ -259,7 +260,7 @@ def test_families_of_names(family: str) -> None:
 
 def test_every_family_names_joints_of_the_body_once() -> None:
     body = {joint.name for joint in joints()}
-    for family, table in matching.families().items():
+    for family, table in families().items():
         assert set(table.values()) <= body, family
         assert "HumanoidRoot" in table.values()
         for name, joint in table.items():

@@ -51,8 +51,7 @@ def turn_foot(targets: Targets, side: str) -> None:
     if targets.aims.get(ankle) != toe:
         _split_foot(targets, ankle, subtalar, foot)
         return
-    centres = {j: targets.skeleton.centres[targets.skeleton.number(j)] for j in (ankle, subtalar, toe)}
-    heel, sole = centres[subtalar] - centres[ankle], centres[toe] - centres[subtalar]
+    heel, sole = targets.skeleton.bone(ankle, subtalar), targets.skeleton.bone(subtalar, toe)
     direction = foot @ targets.bone(ankle, toe)
     for _ in range(FOOT_ITERATIONS):  # the bone between the two joints turns with the ankle only
         _split_foot(targets, ankle, subtalar, foot)
@@ -82,10 +81,8 @@ def plant_feet(targets: Targets, root: Float64, scale: float, floor: str, plant:
     0, else for that of the source. plant: move the legs, too, which changes the targets.
     """
     root = root.copy()
-    rate = float(targets.motion.rate)
-    source = soles.source_soles(
-        targets.motion, targets.mapped, targets.source_rotations, targets.source_positions, scale
-    )
+    rate = float(targets.source.motion.rate)
+    source = soles.source_soles(targets.source, scale)
     if source is None or soles.body_soles(targets.skeleton, targets.rotations, root) is None:
         return root
     level = ground.level_under(source.lowest, source.points)
@@ -198,7 +195,7 @@ def _source_bend(targets: Targets, side: str) -> Float64:
     """Return the bend (T,) of the source's toes in radians, upwards; 0 for a source without toes."""
     joint = f"{side}_metatarsal"
     if joint not in targets.rotations:
-        return np.zeros(len(targets.motion))
+        return np.zeros(len(targets.source.motion))
     above = targets.parent_rotation(joint)
     return targets.closest_angles(joint, np.swapaxes(above, 1, 2) @ targets.rotations[joint])[:, 0]
 

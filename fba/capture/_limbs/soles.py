@@ -20,7 +20,7 @@ from fba.body import SIDES, BodyModel, Skeleton
 from fba.body.footing import SOLE, lowest_edge
 from fba.body.stance import HEEL, find_standing, heel_and_ball
 from fba.capture._limbs._coupled_paths import chain
-from fba.capture.motion import SkeletonMotion
+from fba.capture.motion import MappedMotion
 
 LEVEL_SECONDS = 0.2
 """Seconds over which the height of the ground under feet that stand is averaged."""
@@ -83,39 +83,35 @@ class Soles:
     balls: Float64
 
 
-def source_soles(
-    motion: SkeletonMotion, mapped: Mapping[str, int], turned: Float64, positions: Float64, metres: float
-) -> Soles | None:
+def source_soles(source: MappedMotion, metres: float) -> Soles | None:
     """Return the source's soles, or None if it lacks an ankle.
 
-    turned: (T, J, 4), world rotations. positions: (T, J, 3), in the source's unit. metres: of the body for
-    one unit. The points of a sole are ankle, joints and bone ends below it, and a heel. If no point is behind
-    the ankle, the heel is as far behind it as the body's, and as far below it as the lowest point of the rest
-    pose.
+    metres: of the body for one unit of the source. The points of a sole are ankle, joints and bone ends below
+    it, and a heel. If no point is behind the ankle, the heel is as far behind it as the body's, and as far
+    below it as the lowest point of the rest pose.
     """
-    if "l_ankle" not in mapped or "r_ankle" not in mapped:
+    if "l_ankle" not in source or "r_ankle" not in source:
         return None
-    rest = motion.rest()
+    motion = source.motion
+    rest, positions = motion.rest(), motion.world()[1]
     lows, points, balls = [], [], []
-    for side in "lr":
-        ankle = mapped[f"{side}_ankle"]
+    for side in SIDES:
+        ankle = source.mapped[f"{side}_ankle"]
+        turn = motion.joint_rotations(ankle)
         foot = motion.descendants(ankle)
         at_rest = [rest[joint] - rest[ankle] for joint in foot]
         moving = [positions[:, joint] for joint in foot]
-        for parent, offset in zip(motion.end_parents, motion.end_offsets, strict=True):
-            if int(parent) in foot:
+        for parent, offset in zip(motion.end_parents.tolist(), motion.end_offsets, strict=True):
+            if parent in foot:
                 at_rest.append(rest[parent] + offset - rest[ankle])
-                turn = rotations.matrices(turned[:, parent])
-                moving.append(positions[:, parent] + turn @ offset)
+                moving.append(positions[:, parent] + motion.joint_rotations(parent) @ offset)
         ahead = max(at_rest, key=lambda point: float(np.hypot(point[0], point[2]))) * [1.0, 0.0, 1.0]
         ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
         along = [float(point @ ahead) * metres for point in at_rest]
         depth = min(float(point[1]) for point in at_rest)
         if max(along) < MIN_FOOT_LENGTH:  # the foot ends at the ankle: its front is that of the body
             depth = min(depth, -ANKLE_HEIGHT / metres)
-            turn = rotations.matrices(turned[:, ankle])
-            left = rest[mapped["l_ankle"]] - rest[mapped["r_ankle"]]
-            ahead = np.cross(left, [0.0, 1.0, 0.0])
+            ahead = np.cross(source.rest["l_ankle"] - source.rest["r_ankle"], [0.0, 1.0, 0.0])
             ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
             point = np.array([0.0, depth, 0.0]) + ahead * (BALL_DISTANCE / metres)
             at_rest.append(point)
@@ -125,10 +121,9 @@ def source_soles(
             heel = moving[int(np.argmin(along))]
         else:
             behind = np.array([0.0, depth, 0.0]) - ahead * (HEEL / metres)
-            turn = rotations.matrices(turned[:, ankle])
             heel = positions[:, ankle] + turn @ behind
             moving.append(heel)
-        ball = mapped.get(f"{side}_metatarsal")
+        ball = source.mapped.get(f"{side}_metatarsal")
         front = moving[int(np.argmax(along))] if ball is None else positions[:, ball]
         lowest = np.min([point[:, 1] for point in moving], axis=0)
         thick = 0.0 if ball is None else float(rest[ball, 1] - rest[ankle, 1]) - depth
@@ -138,10 +133,10 @@ def source_soles(
     return Soles(np.array(lows) * metres, np.array(points) * metres, np.maximum(balls, 0.0) * metres)
 
 
-def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64) -> Soles | None:
+def body_soles(skeleton: Skeleton, turns: Mapping[str, Float64], root: Float64) -> Soles | None:
     """Return the body's soles, or None if it lacks a joint of the feet.
 
-    wanted: joint -> world rotations (T, 3, 3); other joints turn with their parents. root: (T, 3), metres.
+    turns: joint -> world rotations (T, 3, 3); other joints turn with their parents. root: (T, 3), metres.
     The lowest points are of the soles' edge, see `fba.body.footing`: for the default skeleton those of the
     person that is shown, who has other proportions and stands with the lower foot where the skeleton does.
     """
@@ -152,7 +147,7 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
         last = f"{side}_metatarsal"
         if last not in skeleton:
             return None
-        frames = joint_frames(skeleton, wanted, root, last)
+        frames = joint_frames(skeleton, turns, root, last)
         ends = heel_and_ball(skeleton, frames, side)
         if ends is None:
             return None
@@ -160,7 +155,7 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
         lows.append(lowest_edge(skeleton, frames, side, SOLE))
         balls.append(ends[1][:, 1] - lows[-1])
         if shown is not skeleton:
-            shown_lows.append(lowest_edge(shown, joint_frames(shown, wanted, root, last), side, SOLE))
+            shown_lows.append(lowest_edge(shown, joint_frames(shown, turns, root, last), side, SOLE))
     lowest = np.array(lows)
     if shown_lows:
         lowest = np.array(shown_lows) + lowest.min(axis=0) - np.min(shown_lows, axis=0)
@@ -168,11 +163,11 @@ def body_soles(skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64)
 
 
 def joint_frames(
-    skeleton: Skeleton, wanted: Mapping[str, Float64], root: Float64, last: str
+    skeleton: Skeleton, turns: Mapping[str, Float64], root: Float64, last: str
 ) -> dict[str, tuple[Float64, Float64]]:
     """Return position (T, 3) and rotation (T, 3, 3) of the joints from the root to `last`, by name.
 
-    wanted, root: as for `body_soles`.
+    turns, root: as for `body_soles`.
     """
     path = [skeleton.number(last)]
     while skeleton.parents[path[-1]] >= 0:
@@ -183,7 +178,7 @@ def joint_frames(
         name, parent = skeleton.names[number], int(skeleton.parents[number])
         if parent >= 0:
             position = position + frame @ (skeleton.centres[number] - skeleton.centres[parent])
-        frame = wanted.get(name, frame)
+        frame = turns.get(name, frame)
         result[name] = position, frame
     return result
 

@@ -9,27 +9,21 @@ import numpy as np
 from fba.arrays import Float64, Int64
 from fba.body import BapSolver, Skeleton
 from fba.body.solve.solver_loops import joint_angles
-from fba.capture.motion import SkeletonMotion
+from fba.capture.motion import MappedMotion
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
     """Target rotations of the body's joints, and the captured motion that they follow.
 
-    motion: the source, T frames. mapped: joint of the body -> number of the source's joint.
     aims: joint -> the joint at the other end of its bone, where the source has both.
-    source_rotations: (T, J, 4), world quaternions of the source's joints. source_positions: (T, J, 3), their
-    positions in the source's unit.
     rotations: joint -> (T, 3, 3), target in world axes; the limbs' functions replace its entries one by one.
     feet: side "l" or "r" -> (T, 3, 3), target of the whole foot, which ankle and subtalar joint share.
     """
 
     solver: BapSolver
-    motion: SkeletonMotion
-    mapped: dict[str, int]
+    source: MappedMotion
     aims: dict[str, str]
-    source_rotations: Float64
-    source_positions: Float64
     rotations: dict[str, Float64]
     feet: dict[str, Float64]
 
@@ -40,8 +34,7 @@ class Targets:
 
     def bone(self, joint: str, aim: str) -> Float64:
         """Return the unit vector (3,) from one joint of the resting body to another."""
-        centres, number = self.skeleton.centres, self.skeleton.number
-        vector = centres[number(aim)] - centres[number(joint)]
+        vector = self.skeleton.bone(joint, aim)
         unit: Float64 = vector / np.linalg.norm(vector)
         return unit
 
@@ -63,7 +56,7 @@ class Targets:
         while (number := int(self.skeleton.parents[number])) >= 0:
             if self.skeleton.names[number] in self.rotations:
                 return self.rotations[self.skeleton.names[number]]
-        return np.broadcast_to(np.eye(3), (len(self.motion), 3, 3))
+        return np.broadcast_to(np.eye(3), (len(self.source.motion), 3, 3))
 
     def closest_angles(self, joint: str, local: Float64) -> Float64:
         """Return the angles (T, K) about a joint's axes closest to the rotations local (T, 3, 3)."""

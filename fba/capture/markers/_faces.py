@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import get_args
@@ -293,20 +293,20 @@ def _measure_points(
     actor: _Actor, times: Float64, model: FaceModel, traits: Traits
 ) -> tuple[Float64, Float64]:
     """Return the neutral feature points, float64 (84, 3), and how they move from there, (T, 84, 3)."""
-    local, names = actor.local, tuple(actor.places)
-    neutral = np.median(local[actor.rest], axis=0)
-    for n, name in enumerate(names):
+    neutral = np.median(actor.local[actor.rest], axis=0)
+    for n, name in enumerate(actor.places):
         if name in traits.rests:
-            neutral[n] = np.median(local[traits.rests[name], n], axis=0)
+            neutral[n] = np.median(actor.local[traits.rests[name], n], axis=0)
         neutral[n, 1] -= traits.raised.get(name, 0.0)
-    placed = {place: neutral[n] for n, place in enumerate(actor.places.values()) if place != "head"}
-    points = complete_points(placed, model.points)
-    _open_by_blinks(points, actor.places, names, local - neutral, times)
-    moved = np.zeros((len(local), len(points), 3))
+    columns = {place: n for n, place in enumerate(actor.places.values()) if place != "head"}
+    points = complete_points({place: neutral[n] for place, n in columns.items()}, model.points)
+    paths = {place: actor.local[:, n] - neutral[n] for place, n in columns.items()}
+    _open_by_blinks(points, paths, times)
+    moved = np.zeros((len(times), len(points), 3))
     rows = point_rows()
-    for n, place in enumerate(actor.places.values()):
+    for place, path in paths.items():
         if place in rows:
-            moved[:, rows[place]] = local[:, n] - neutral[n]
+            moved[:, rows[place]] = path
     return points, moved
 
 
@@ -347,16 +347,17 @@ def _turn_eyes(
     return (*YAW_EYE, *PITCH_EYE)
 
 
-def _open_by_blinks(
-    points: Float64, places: Mapping[str, str], names: Sequence[str], moved: Float64, times: Float64
-) -> None:
-    """Move lower lids without markers to where blinks show them, in points, float64 (84, 3)."""
-    rows, placed = point_rows(), {places[name]: n for n, name in enumerate(names)}
-    lids = {upper: lower for upper, lower in LOWER_LIDS.items() if upper in placed and lower not in placed}
+def _open_by_blinks(points: Float64, paths: Mapping[str, Float64], times: Float64) -> None:
+    """Move lower lids without markers to where blinks show them, in points, float64 (84, 3).
+
+    paths: place -> (T, 3), the motion of its marker.
+    """
+    rows = point_rows()
+    lids = {upper: lower for upper, lower in LOWER_LIDS.items() if upper in paths and lower not in paths}
     if not lids:
         return
     usual = np.mean([points[rows[upper], 1] - points[rows[lower], 1] for upper, lower in lids.items()])
-    sunk = -moved[:, [placed[upper] for upper in lids], 1]
+    sunk = np.stack([-paths[upper][:, 1] for upper in lids], axis=1)
     opening = opening_by_blinks(sunk, times, float(usual))
     if opening is not None:
         for upper, lower in lids.items():

@@ -78,18 +78,24 @@ def _report(path: Path, file: Path, reading: Reading, face: str | None, *, print
 
     path: as typed. file: to be read. face: the name of the captured face to read.
     """
+    from fba.codec import StreamInfo
+
     reader, size = find_format(file, reading.format), file.stat().st_size
-    person = None if reader.describe_person is None else reader.describe_person(file, limits=reading.limit)
-    if person is not None:
-        if reading.clip is not None:
-            raise ModelError(f"there is no animation {reading.clip!r}; the file has none")
-        if printed:
-            _print_person(path, size, person)
-        return {"file": str(path), "format": "gltf", "size": size, "person": asdict(person)}
+    clips: tuple[ClipInfo, ...] = ()
     if reader.read_face is not None:
         return _report_face(path, file, reader, reading, face, printed=printed)
-    info = probe_input(file, reading)
-    clips = () if reader.list_clips is None else reader.list_clips(file, limits=reading.limit)
+    if reader.describe is None:
+        info = probe_input(file, reading)
+    else:
+        content = reader.describe(file, clip=reading.clip, limits=reading.limit)
+        if content.person is not None:
+            if reading.clip is not None:
+                raise ModelError(f"there is no animation {reading.clip!r}; the file has none")
+            if printed:
+                _print_person(path, size, content.person)
+            return {"file": str(path), "format": "gltf", "size": size, "person": asdict(content.person)}
+        assert content.animation is not None  # as there is no person
+        info, clips = StreamInfo.of_animation(content.animation, reader.name, size), content.clips
     steps = ""
     if info.format == "fba" and info.body is not None:
         data = file.read_bytes()

@@ -69,28 +69,34 @@ def read_person(
     than the limits allow; warns (FbaWarning) of what is left out.
     """
     with naming_file(path):
-        gltf = read_gltf(path, limits=limits)
-        if options == SkeletonOptions() and (stored := _read_stored(gltf, clip)) is not None:
-            return Captured(stored if rate is None else stored.resample(Fraction(rate), limits=limits))
-        if (face_clip := _clip_of_face_alone(gltf, clip)) is not None:
-            return Captured(_read_face_alone(gltf, face_clip, rate, limits))
-        motion = None
-        try:
-            with warnings.catch_warnings(record=True) as said:
-                warnings.simplefilter("always", FbaWarning)
-                motion = _sample(gltf, clip, rate, limits)
-                made = retarget_motion(motion, None, options, limits=limits)
-        except ModelError as error:
-            person = motion is not None and _has_limbs(motion)  # whose pose is not clear
-            if person or options.joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
-                raise
-            if _count_turning(face_clip, gltf) >= MAX_HEAD_JOINTS:
-                text = f"{gltf.file}: no body is read, the face alone: {error.finding}"
-                warnings.warn(FbaWarning(text).with_remedies(*error.remedies), stacklevel=2)
-            return Captured(_read_face_alone(gltf, face_clip, rate, limits))
-        for each in said:  # about a skeleton, only if it is that of a person
-            warnings.warn(each.message, each.category, stacklevel=2)
-        return made
+        return make_person(read_gltf(path, limits=limits), options, clip, rate, limits)
+
+
+def make_person(
+    gltf: Gltf, options: SkeletonOptions, clip: str | int | None, rate: Rate | None, limits: Limits
+) -> Captured:
+    """Return what `read_person` does, of a file that was read."""
+    if options == SkeletonOptions() and (stored := _read_stored(gltf, clip)) is not None:
+        return Captured(stored if rate is None else stored.resample(Fraction(rate), limits=limits))
+    if (face_clip := _clip_of_face_alone(gltf, clip)) is not None:
+        return Captured(_read_face_alone(gltf, face_clip, rate, limits))
+    motion = None
+    try:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", FbaWarning)
+            motion = _sample(gltf, clip, rate, limits)
+            made = retarget_motion(motion, None, options, limits=limits)
+    except ModelError as error:
+        person = motion is not None and _has_limbs(motion)  # whose pose is not clear
+        if person or options.joints is not None or (face_clip := find_face_clip(gltf, clip)) is None:
+            raise
+        if _count_turning(face_clip, gltf) >= MAX_HEAD_JOINTS:
+            text = f"{gltf.file}: no body is read, the face alone: {error.finding}"
+            warnings.warn(FbaWarning(text).with_remedies(*error.remedies), stacklevel=3)
+        return Captured(_read_face_alone(gltf, face_clip, rate, limits))
+    for each in said:  # about a skeleton, only if it is that of a person
+        warnings.warn(each.message, each.category, stacklevel=3)
+    return made
 
 
 def _read_stored(gltf: Gltf, clip: str | int | None) -> Animation | None:

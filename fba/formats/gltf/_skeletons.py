@@ -11,8 +11,8 @@ import numpy as np
 
 from fba import rotations
 from fba.body import ROOT, Skeleton
-from fba.capture import SkeletonMotion, matching
-from fba.capture.bones import find_bones
+from fba.capture import SkeletonMotion
+from fba.capture.bones import find_bones, match
 from fba.errors import FbaWarning, ModelError
 from fba.formats.gltf._pose import BindPose, find_bind_pose
 from fba.formats.gltf.humanoid import Humanoid, find_humanoid
@@ -212,6 +212,6 @@ def _descendants(parents: list[int], root: int) -> list[int]:
 def _fit(gltf: Gltf, tree: list[int]) -> int:
     """Return the count of nodes with known names."""
     try:
-        return len(matching.match([gltf.nodes[number].name for number in tree])[1])
+        return len(match([gltf.nodes[number].name for number in tree])[1])
     except ModelError:
         return 0

@@ -18,20 +18,23 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from fba import rotations
+from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.body import ROOT, BodyModel, BodyPart, Skeleton
 from fba.body.own_head import OwnHead
 from fba.body.skin.skin_weights import strongest_weights
-from fba.capture import SkeletonMotion, shape_faps
+from fba.capture import SkeletonMotion, SkeletonOptions, shape_faps
 from fba.capture.preparation import Rest, find_rest
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices
+from fba.formats.gltf._reader import make_person
 from fba.formats.gltf._skeletons import Joints, find_joints
+from fba.formats.gltf.clips import ClipInfo, list_clips
 from fba.gltf import Gltf, GltfMaterial, Node, Primitive, convert_material, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh import Material, UniqueNames
-from fba.source import Path
+from fba.source import Path, naming_file
 
 CHUNK = 20_000
 """Vertices whose weights are reduced at once."""
@@ -105,14 +108,27 @@ class PersonInfo:
     shapes: int
 
 
-def describe_person(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> PersonInfo | None:
-    """Return the person in a glTF file without an animation; None with an animation, or without a person.
+@dataclass(frozen=True, eq=False)
+class Content:
+    """What a glTF file holds: its clips and an animation, or a person without any."""
 
-    Raises FormatError, ModelError, and LimitError for more than the limits allow.
-    """
+    clips: tuple[ClipInfo, ...] = ()
+    animation: Animation | None = None
+    person: PersonInfo | None = None
+
+
+def describe(path: Path, *, clip: str | int | None = None, limits: Limits = DEFAULT_LIMITS) -> Content:
+    """Return the content of a glTF file. clip, errors and warnings: as for reading it."""
     gltf = read_gltf(path, limits=limits)
-    if gltf.animations:
-        return None
+    if not gltf.animations and (person := _describe_person(gltf)) is not None:
+        return Content(person=person)
+    with naming_file(path):
+        made = make_person(gltf, SkeletonOptions(), clip, None, limits)
+    return Content(list_clips(gltf), made.animation)
+
+
+def _describe_person(gltf: Gltf) -> PersonInfo | None:
+    """Return the person in a file, or None."""
     try:
         found = find_joints(gltf)
         rest = find_rest(found.resting(gltf), Skeleton.default())

@@ -7,9 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from fba.errors import FbaWarning, ModelError, Remedy, did_you_mean
-from fba.gltf import Clip, Gltf, read_gltf
-from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path
+from fba.gltf import Clip, Gltf
 
 NAMED = 8
 """Most clips that a message names."""
@@ -28,13 +26,10 @@ class ClipInfo:
     channels: int
 
 
-def list_clips(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[ClipInfo, ...]:
-    """Return the clips of a glTF file, in its order.
-
-    Raises FormatError, ModelError, and LimitError for more than the limits allow.
-    """
+def list_clips(gltf: Gltf) -> tuple[ClipInfo, ...]:
+    """Return the clips of a glTF file, in its order."""
     clips = []
-    for clip in read_gltf(path, limits=limits).animations:
+    for clip in gltf.animations:
         begins = [float(channel.times[0]) for channel in clip.channels if len(channel.times)]
         ends = [float(channel.times[-1]) for channel in clip.channels if len(channel.times)]
         seconds = max(ends, default=0.0) - min(begins, default=0.0)

@@ -263,13 +263,13 @@ def read_any(path: Path) -> object:
 
 def read_motion(path: Path) -> object:
     """Read a capture, and find its joints by their names."""
-    from fba.capture import matching
+    from fba.capture.bones import match
     from fba.formats import format_of
 
     read = format_of(path).read_motion
     assert read is not None
     motion = read(path)
-    return matching.match(motion.names)
+    return match(motion.names)
 
 
 def encode_capture(path: Path) -> object:
