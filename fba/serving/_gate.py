@@ -71,7 +71,7 @@ class Gate:
         return None
 
     def stream_of(self, path: str) -> int | None:
-        """Return the number of the stream at a path; None where there is none, or its token is wrong."""
+        """Return the number of the stream at a path; None without a stream, or with a wrong token."""
         match = re.fullmatch(r"/stream(?:\?n=(\d{1,4}))?", self._without_token(path), re.ASCII)
         number = -1 if match is None else int(match[1] or 0)
         return number if 0 <= number < self._streams else None

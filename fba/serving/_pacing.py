@@ -61,7 +61,7 @@ def show_file(stage: Stage, stream: tuple[list[Plane], bytes], *, loop: bool = F
 def show_pipe(stage: Stage, read: Callable[[int], bytes], splitter: PlaneSplitter) -> None:
     """Show a stream that arrives, to its end.
 
-    read: returns at most so many bytes that have arrived, b"" at the end. A file that comes faster than real
+    read: returns up to a number of bytes that have arrived, b"" at the end. A file that comes faster than real
     time is slowed down to it. Raises BitstreamError for a stream without planes, LimitError, OSError.
     """
     for plane in paced(_arriving(read, splitter), stage, lead=LEAD):
@@ -76,7 +76,7 @@ def _arriving(read: Callable[[int], bytes], splitter: PlaneSplitter) -> Iterator
 
 
 def paced(planes: Iterable[Plane], stage: Stage, *, lead: float = 0.0) -> Iterator[Plane]:
-    """Yield planes, each when its time has come, or so many seconds before, until the server stops."""
+    """Yield each plane at its time, or `lead` seconds before it, until the server stops."""
     begun = last = 0.0
     for count, plane in enumerate(planes):
         if not count or not 0 <= plane.time - last <= LONGEST_PAUSE:

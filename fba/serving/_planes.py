@@ -133,7 +133,7 @@ class _State:
         self._set: set[str] = set()
 
     def renewed_by(self, settings: PlaneSettings, time: float) -> bool:
-        """Whether a plane, at so many seconds, sets all of it again, so that a decoder can begin there.
+        """Whether a plane, at a time in seconds, sets all of it again, so that a decoder can begin there.
 
         A decoder that begins without a time code would be set to another time by the next.
         """

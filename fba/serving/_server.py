@@ -154,7 +154,7 @@ class Server:
             await server.wait_closed()
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request; None where it may go on to a stream, or is none that a browser makes."""
+        """Answer a request; None for one that may go on to a stream, or that no browser makes."""
         from websockets.datastructures import Headers
         from websockets.http11 import Response
 
@@ -240,7 +240,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def _silent_logger() -> logging.Logger:
-    """Return a logger that drops what strangers make a server say, such as requests that are none."""
+    """Return a logger that drops what strangers make a server say, such as words on broken requests."""
     logger = logging.Logger("fba.serving")
     logger.addHandler(logging.NullHandler())
     return logger

@@ -92,7 +92,7 @@ class Container:
 
 
 def rounded(values: npt.ArrayLike, digits: int = 9) -> Any:
-    """Return numbers as lists of at most so many significant digits, for a header."""
+    """Return numbers as lists, rounded to a number of significant digits, for a header."""
     array: Float64 = np.asarray(values, dtype=np.float64)
     if array.ndim:
         return [rounded(value, digits) for value in array]
