@@ -61,8 +61,8 @@ def show_file(stage: Stage, stream: tuple[list[Plane], bytes], *, loop: bool = F
 def show_pipe(stage: Stage, read: Callable[[int], bytes], splitter: PlaneSplitter) -> None:
     """Show a stream that arrives, to its end.
 
-    read: returns up to a number of bytes that have arrived, b"" at the end. A file that comes faster than real
-    time is slowed down to it. Raises BitstreamError for a stream without planes, LimitError, OSError.
+    read: returns up to a number of bytes that have arrived, b"" at the end. A file that comes faster than
+    real time is slowed down to it. Raises BitstreamError for a stream without planes, LimitError, OSError.
     """
     for plane in paced(_arriving(read, splitter), stage, lead=LEAD):
         stage.publish(plane)
