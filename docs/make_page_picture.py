@@ -1,4 +1,4 @@
-"""Make the picture of the page of `fba export`, with node and Chromium: `python docs/make_page_picture.py`."""
+"""Make the picture of the page of `fba export`: `python docs/make_page_picture.py`; it takes Chromium."""
 
 from __future__ import annotations
 

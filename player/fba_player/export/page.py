@@ -8,7 +8,7 @@ import hashlib
 import html
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -135,7 +135,8 @@ def animation_page(animation: Animation, **options: Any) -> str:
     """Return a page that plays an animation. options: as for `make_page`."""
     from fba.codec import encode_animation
 
-    stream = PageStream(animation.name or "animation", encode_animation(animation)[0])
+    started = replace(animation, index=animation.index - animation.index[0])  # a page begins at 0
+    stream = PageStream(animation.name or "animation", encode_animation(started)[0])
     with_body = animation.body is not None
     return make_page([stream], with_body=with_body, with_head=not with_body, **options)
 

@@ -19,7 +19,7 @@ const [PITCH, YAW, ROLL] = [47, 48, 49]; // columns of the FAPs of the head
 export class FBAClip {
   /** @param {import("./decoder/animation.js").Animation} animation */
   constructor(animation) {
-    this._timeline = new Timeline(framesOf(animation), new Resolver(new Rules({ definitions: DEFINITIONS, fit: null })));
+    this._timeline = new Timeline(framesOf(animation), new Resolver(new Rules({ definitions: DEFINITIONS, fit: [] })));
     this.start = this._timeline.start;
     /** Seconds. */
     this.duration = this._timeline.end - this._timeline.start;

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import io
+import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,11 +18,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import fba
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.player import Preview
 from fba_player.export import _offscreen as offscreen
 from fba_player.export import notebook
+from fba_player.export.page import animation_page
 from player_tracks import face_track
 from sound_clicks import click_time, write_click
 
@@ -84,9 +88,25 @@ def shown(subject: Animation | Preview) -> Page:
     return page
 
 
-@pytest.mark.usefixtures("opengl")
-def test_a_clip_shows_itself_as_a_small_film(talking: Animation) -> None:
+def test_a_clip_shows_itself_as_a_page_to_play(talking: Animation) -> None:
     page = shown(talking[6:])
+    assert page.text == "talking: 4 frames, 0:00.160 at 25 frames/s, face"
+    framed = page.elements["iframe"]["srcdoc"] or ""
+    assert framed == animation_page(talking[6:])
+    content = re.search(r'id="fba-content">(.*?)</script>', framed)
+    assert content is not None
+    [source] = json.loads(content[1])["sources"]
+    assert len(fba.decode(base64.b64decode(source["data"]))) == 4
+
+
+def test_what_no_stream_carries_shows_itself_as_a_film(talking: Animation) -> None:
+    loud = replace(talking, face=replace(talking.face, values=np.where(talking.face.mask, 2**30, 0)))
+    assert "A film only:" in shown(loud).text
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_preview_is_a_small_film(talking: Animation) -> None:
+    page = shown(Preview(talking[6:]))
     assert page.text == "talking: 4 frames, 0:00.160 at 25 frames/s, face"
     assert page.elements["video"]["width"] == "480"
     with av.open(io.BytesIO(page.data("video", "video/mp4"))) as film:
@@ -134,7 +154,7 @@ def test_without_opengl_it_is_a_line(talking: Animation, monkeypatch: pytest.Mon
         raise DisplayError("no OpenGL: install libegl1 & libgl1")
 
     monkeypatch.setattr(offscreen, "offscreen_context", none)
-    page = shown(talking)
+    page = shown(Preview(talking))
     assert "No picture: no OpenGL: install libegl1 & libgl1" in page.text
     assert not {"video", "img"} & page.elements.keys()
 

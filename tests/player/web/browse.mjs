@@ -62,10 +62,19 @@ async function until(expression) {
   return true;
 }
 
+/** Press a key, perhaps with Shift. */
+async function press(parts, key) {
+  const [name, held] = parts.length > 1 ? [parts[1], parts[0]] : [key, null];
+  if (held) await page.keyboard.down(held);
+  await page.keyboard.press(name);
+  if (held) await page.keyboard.up(held);
+  return null;
+}
+
 async function take(step) {
   if (step.wait) return until(step.wait);
   if (step.run) return page.evaluate(step.run);
-  if (step.key) return page.keyboard.press(step.key).then(() => null);
+  if (step.key) return press(step.key.split("+").filter(Boolean), step.key);
   if (step.size) return kind === "firefox" ? page.setViewport({ width: step.size[0], height: step.size[1] }) : page.setViewportSize({ width: step.size[0], height: step.size[1] });
   if (step.shot) return page.screenshot({ path: step.shot }).then(() => null);
   if (step.click) {

@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fba_player.playback.timeline import Timeline
 
 import fba
 from fba.arrays import Float64
-from fba.body import BodyModel
-from fba.body.footing import GroundedPoser
+from fba.body import BodyModel, GroundedPoser
 from fba.face import FaceModel, Function, InterpolationTable, Link, Term, resolve
 from fba.tracks import FaceTrack
+from fba_player import Timeline
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._figure.person import Person, build_person
 from fba_player.view._geometry import rotation_vector
