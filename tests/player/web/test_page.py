@@ -271,7 +271,7 @@ def test_the_sound_is_the_clock(browse: Browse, hello: Animation, tmp_path: Path
 def test_live(browse: Browse, hello: Animation) -> None:
     stream = split_stream(fba.encode(hello, fba.EncoderOptions(intra_period=25, start_codes=True)))
     page = make_page([], with_body=True, live=True).encode()
-    with Server(page, ["hello"], port=0) as server:
+    with Server(page, ["hello", "<b>other"], port=0) as server:
         server.start(0, lambda stage: show_file(stage, stream, loop=True))
         count = f"{PLAYER}.addEventListener('frames', ({{detail}}) => window.count += detail)"
         heard = f"(window.count ??= ({count}, 1))"
@@ -283,7 +283,8 @@ def test_live(browse: Browse, hello: Animation) -> None:
                 {"run": f"{PLAYER}.paused"},
                 {"run": f"{PLAYER}.duration === Infinity"},
                 {"run": "document.title"},
+                {"run": f"{PLAYER}.shadowRoot.querySelector('.streams').textContent"},
             ],
         )
     assert results["errors"] == []
-    assert results["results"][2:] == [False, True, "hello"]
+    assert results["results"][2:] == [False, True, "hello", "hello<b>other"]

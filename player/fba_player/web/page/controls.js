@@ -62,6 +62,7 @@ export const TEMPLATE = `
   <div class="stage" part="stage">
     <canvas role="img" aria-label="animated figure"></canvas>
     <div class="names" aria-hidden="true"></div>
+    <nav class="streams" aria-label="streams"></nav>
     <div class="toast" role="status"></div>
     <div class="message" role="alert" hidden></div>
   </div>

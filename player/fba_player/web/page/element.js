@@ -270,7 +270,7 @@ export class FBAPlayer extends HTMLElement {
       since: NaN,
       lost: 0,
       stream: new LiveStream(url, {
-        hello: (titles, number) => (document.title = titles[number] ?? document.title),
+        hello: (titles, number) => this._showStreams(titles, number),
         start: () => (live.timeline = null),
         frames: (frames) => this._receive(frames),
         lost: (planes) => this.toast(`${(live.lost += planes)} planes lost: this page or its connection is too slow`),
@@ -300,6 +300,14 @@ export class FBAPlayer extends HTMLElement {
     this._say("");
     this.playback.playing = true;
     this._changed("loadedmetadata");
+  }
+
+  /** List the streams of the server, if there are several. @param {string[]} titles @param {number} number of the one that is shown */
+  _showStreams(titles, number) {
+    document.title = titles[number] ?? document.title;
+    const links = titles.map((title, k) => Object.assign(document.createElement("a"), { href: `?n=${k}`, textContent: title }));
+    links[number]?.setAttribute("aria-current", "page");
+    this._find(".streams").replaceChildren(...(titles.length > 1 ? links : []));
   }
 
   /** @param {import("./live.js").State} state @param {number} seconds */
