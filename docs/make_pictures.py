@@ -43,6 +43,7 @@ PICTURES = {
     "loss.svg": "make_loss_picture.main",
     "markers-page.jpg": "make_player_pictures.markers",
     "moods.jpg": "make_mood_picture.moods",
+    "page.jpg": "make_page_picture.main",
     "panels.jpg": "make_player_pictures.panels",
     "persona-styles.jpg": "make_persona_style_picture.main",
     "persona.jpg": "make_persona_picture.main",

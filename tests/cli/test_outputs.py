@@ -72,7 +72,7 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
     assert writing == {
         "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
         "conformance", "capture", "markers", "express", "model learn-fit", "emote", "emotion",
-        "persona learn", "persona play",
+        "persona learn", "persona play", "export",
     }  # fmt: skip
 
 

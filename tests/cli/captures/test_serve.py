@@ -31,6 +31,14 @@ LOCAL = "127.0.0.1"
 STREAM = encode_animation(performance(), JOINABLE)[0]
 
 
+@pytest.fixture(autouse=True)
+def interruptible() -> Iterator[None]:
+    """Let programs be interrupted also where the tests run in the background, whose programs ignore Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @contextmanager
 def serving(*arguments: object, **options: Any) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Start a command; give it and the address of its streams, once it has said that."""

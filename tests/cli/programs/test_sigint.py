@@ -185,8 +185,8 @@ fba._numba_cache.MachineCode.load_overload = loaded
 LAST = """
 import fba.live.recording
 warm_up = fba.live.recording.warm_up
-def warmed(**options):
-    warm_up(**options)
+def warmed(*targets, **options):
+    warm_up(*targets, **options)
     interrupt_llvm()
 fba.live.recording.warm_up = warmed
 """
