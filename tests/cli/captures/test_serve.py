@@ -33,7 +33,7 @@ STREAM = encode_animation(performance(), JOINABLE)[0]
 
 @pytest.fixture(autouse=True)
 def interruptible() -> Iterator[None]:
-    """Let programs be interrupted also where the tests run in the background, whose programs ignore Ctrl-C."""
+    """Let programs be interrupted in the background, too, where they ignore Ctrl-C."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
