@@ -9,7 +9,7 @@ import { readFileSync, writeFileSync } from "node:fs";
 import { FbaError, decode } from "../../../player/fba_player/web/fba.js";
 import { Figure } from "../../../player/fba_player/web/figure/figure.js";
 import { Resolver } from "../../../player/fba_player/web/figure/resolve.js";
-import { Timeline } from "../../../player/fba_player/web/figure/timeline.js";
+import { Timeline, framesOf } from "../../../player/fba_player/web/page/timeline.js";
 
 const request = JSON.parse(readFileSync(process.argv[2], "utf8"));
 if (request.damaged) {
@@ -30,13 +30,13 @@ if (request.damaged) {
 }
 
 function shown(figure, animation, frames) {
-  const timeline = new Timeline(animation, figure.rules);
+  const timeline = new Timeline(framesOf(animation), new Resolver(figure.rules));
   const faps = new Float32Array(68);
   const baps = new Float64Array(296);
   return frames.flatMap((frame) => {
     const time = animation.time(frame);
-    timeline.faps(time, faps);
-    figure.show(faps, figure.body ? timeline.baps(time, baps) : undefined);
+    timeline.at(time, faps, baps);
+    figure.show(faps, figure.body ? baps : undefined);
     const parts = ["positions", "normals"].flatMap((what) => figure.parts.map((part) => part[what].slice()));
     return [faps.slice(), figure.body ? figure.body.joints.slice() : rigid(figure.face), ...parts];
   });

@@ -41,17 +41,7 @@ export function invert(matrix) {
   return to;
 }
 
-/** Return a matrix that moves by a vector. @param {Vector} by */
-export function translation([x, y, z]) {
-  return [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1];
-}
-
 /** Return the upper left (3, 3) of a matrix, column after column. @param {Matrix} matrix */
 export function rotationOf(matrix) {
   return [0, 1, 2, 4, 5, 6, 8, 9, 10].map((k) => matrix[k]);
-}
-
-/** @param {Vector} a @param {Vector} b */
-export function dot(a, b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
