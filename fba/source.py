@@ -103,7 +103,11 @@ def naming_file(path: Path) -> Iterator[None]:
     except ModelError as error:
         finding = error.finding.removeprefix(f"{os.path.basename(name)}: ")
         raise FormatError(finding, path=path).with_remedies(*error.remedies) from error
-    except (BitstreamError, LimitError, RangeError, UnsupportedError) as error:
-        if not error.finding.startswith(f"{name}: "):
+    except (BitstreamError, FormatError, LimitError, RangeError, UnsupportedError) as error:
+        if isinstance(error, FormatError):
+            named, error.path = error.path is not None, error.path or name
+        else:
+            named = error.finding.startswith(f"{name}: ")
+        if not named:
             error.args = (f"{name}: {error.finding}",)
         raise

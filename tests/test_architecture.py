@@ -73,6 +73,7 @@ fba.capture.points
 fba.capture
 fba.capture.live
 fba.emotion
+fba.carriage
 fba.formats
 fba.formats.text
 fba.formats.epf
@@ -82,6 +83,7 @@ fba.formats.markers
 fba.formats.c3d
 fba.formats.gltf
 fba.formats.face_tables
+fba.formats.avatar
 fba.live._protocols
 fba.live
 fba.serving

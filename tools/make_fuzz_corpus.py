@@ -21,10 +21,12 @@ ROOT = Path(__file__).parents[1]
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
 sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files", "figures")]
 
+import avatar_files  # noqa: E402
 from fba.arrays import Float64  # noqa: E402
 from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
+from fba.formats import read_motion  # noqa: E402
 from fba.live import KINDS  # noqa: E402
 from fba.persona import learn  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
@@ -448,6 +450,22 @@ def smpl() -> dict[str, bytes]:
     return {name: point_files.archive({**arrays, **common}) for name, arrays in layouts.items()}
 
 
+def avatar_units(folder: Path) -> dict[str, bytes]:
+    """Return a face, a person in a container, and a stream with names of this project."""
+    limb = folder / "limb.bvh"
+    limb.write_bytes(bvh({name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}, 2))
+    rows = [avatar_files.weights(frame, {17: 0.5, 19: 0.25}, flags=128 * frame) for frame in range(2)]
+    placed = np.tile(np.eye(4), (3, 1, 1))
+    both = b"".join(rows[frame] + avatar_files.joints(frame, placed) for frame in range(2))
+    return {
+        "face": avatar_files.configuration() + b"".join(rows),
+        "person": avatar_files.container(
+            folder / "a.arfz", read_motion(limb), seed=0, faces=True
+        ).read_bytes(),
+        "both": avatar_files.configuration("arkit-face mpeg4-body") + both,
+    }
+
+
 def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     """Return all files: content by name, by target. folder: for files that are read again at once."""
     limb = {name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}
@@ -466,6 +484,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
         "capture": {**faces(), **markers()},
         "live": live(),
         "smpl": smpl(),
+        "arf": avatar_units(folder),
         "persona": {"actor": persona(folder)},
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},

@@ -206,6 +206,13 @@ _FORMATS = (
         "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
         _lazy("smpl._reader", "sniff"), read_motion=_lazy("smpl._reader", "read_motion"), kind="skeleton",
     ),
+    Format(
+        "arf", (".aau", ".arfz"), "avatar animation units (ISO/IEC 23090-39), alone or in a container",
+        _lazy("avatar._reader", "sniff"), _lazy("avatar._writer", "write"),
+        read_person=_lazy("avatar._reader", "read_person"),
+        read_motion=_lazy("avatar._reader", "read_motion"), kind="skeleton",
+        written="avatar animation units (ISO/IEC 23090-39)",
+    ),
     _face("openface", ".csv", "action units, pose and gaze of OpenFace", "_openface"),
     _face("pyfeat", ".csv", "blendshapes or action units of py-feat", "_pyfeat"),
     _face(

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import io
 import math
-import zipfile
 from tokenize import TokenError
 from typing import Any
 
 import numpy as np
 
 from fba.arrays import to_float64
-from fba.errors import FbaError, FormatError
+from fba.errors import FormatError
+from fba.formats.zip_files import read_members
 from fba.limits import Limits
 from fba.source import Path, read_whole
 
-NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"
-"""First bytes of an array, and of an archive of arrays."""
-MOST_ARRAYS = 1000
+NPY = b"\x93NUMPY"
+"""First bytes of an array."""
 
 
 def read_arrays(path: Path, limits: Limits, *, single: str, objects: bool = False) -> dict[str, Any]:
@@ -29,24 +28,8 @@ def read_arrays(path: Path, limits: Limits, *, single: str, objects: bool = Fals
     data = read_whole(path)
     if data.startswith(NPY):
         return {single: _read_array(data, path, limits, objects)}
-    arrays = {}
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = archive.infolist()
-            if len(members) > MOST_ARRAYS:
-                raise FormatError(f"holds {len(members)} files; expected a few arrays", path=path)
-            for member in members:
-                if member.filename.endswith(".npy"):
-                    limits.check_bytes(member.file_size, f"{path}: {member.filename}", source=len(data))
-                    arrays[member.filename[:-4]] = _read_array(archive.read(member), path, limits, objects)
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, OSError, ValueError) as error:
-        if isinstance(error, FbaError):
-            raise
-        raise FormatError(f"is no archive of arrays that can be read: {error}", path=path) from error
-    except Exception as error:  # zlib.error and the like have no common class
-        if type(error).__module__ in ("zlib", "lzma", "_lzma"):
-            raise FormatError(f"is damaged: {error}", path=path) from error
-        raise
+    members = read_members(data, path, limits, lambda name: name.endswith(".npy"))
+    arrays = {name[:-4]: _read_array(content, path, limits, objects) for name, content in members}
     return {name: array for name, array in arrays.items() if array is not None}
 
 
@@ -71,4 +54,7 @@ def _read_array(data: bytes, path: Path, limits: Limits, objects: bool) -> Any:
         raise FormatError("is cut off: the array says that it has more numbers than there are", path=path)
     limits.check_bytes(8 * count, f"{path}: an array", source=len(data))
     file.seek(0)
-    return to_float64(np.load(file, allow_pickle=False))
+    try:
+        return to_float64(np.load(file, allow_pickle=False))
+    except (ValueError, EOFError) as error:
+        raise FormatError(f"holds an array that cannot be read: {error}", path=path) from error

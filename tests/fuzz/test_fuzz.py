@@ -148,6 +148,9 @@ READING = {
         "fba.formats.face_tables._points_csv", "fba.formats.face_tables._points_json",
     ),
     "smpl": ("fba.formats.smpl._reader", "fba.formats.numpy_archives"),
+    "arf": (
+        "fba.carriage.avatar_units", "fba.formats.avatar._reader", "fba.formats.avatar._container",
+    ),
     "persona": ("fba.persona._persona", "fba.persona.recognition._archive"),
     "live": (
         "fba.live._protocols.livelink", "fba.live._protocols.ifacialmocap", "fba.live._protocols.vtube",

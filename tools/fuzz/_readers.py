@@ -117,6 +117,13 @@ def check_smpl(data: bytes, folder: Path) -> Outcome:
     return _check_file(_with_checksums(data), folder / "input.npz", read)
 
 
+def check_arf(data: bytes, folder: Path) -> Outcome:
+    """Read avatar animation units as FAPs and BAPs; of containers, the joints."""
+    if not data.startswith(_MEMBER):
+        return _check_file(data, folder / "input.aau", fba.read)
+    return _check_file(_with_checksums(data), folder / "input.arfz", fba.formats.read_motion)
+
+
 def check_persona(data: bytes, folder: Path) -> Outcome:
     """Load a Persona."""
     return _check_file(_with_checksums(data), folder / "input.persona", Persona.load)

@@ -72,6 +72,10 @@ def targets() -> tuple[Target, ...]:
             b"NO_OF_FRAMES\t", b"MARKER_NAMES\t", b"marker,x,y,z", b"\x02\x50", *_TEXT,
         ),
         _reader("smpl", "motion of SMPL bodies, retargeted", b"PK\x03\x04", b"'shape': (3, 156)", *_TEXT),
+        _reader(
+            "arf", "avatar animation units, alone and in containers", b"PK\x03\x04", b"\x02\0\0\0\x0f",
+            b"\x04\0\0\0\x4b", b"mpeg4-body", b'"parent": 1', b'"shapes": [1]', *_TEXT,
+        ),
         _reader("persona", "Personas", b"PK\x03\x04", b'"kind"', b"NEUTRAL", b"'shape': (4, 9)", *_TEXT),
         _reader(
             "live", "live captures, a datagram in each part", b"\0\0\0\0", b"\xff\xff", b"\x06", b"#bundle\0",

@@ -15,7 +15,8 @@ import numpy as np
 
 from fba.arrays import Array, Float64
 from fba.errors import FormatError, UnsupportedError
-from fba.formats.numpy_archives import ZIP, read_arrays
+from fba.formats.numpy_archives import read_arrays
+from fba.formats.zip_files import ZIP
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_head
 

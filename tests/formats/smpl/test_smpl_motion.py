@@ -145,7 +145,7 @@ def test_python_objects_are_not_loaded(tmp_path: Path) -> None:
     assert len(read_motion(path)) == FRAMES
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
-    with pytest.raises(FormatError, match="no archive of arrays that can be read"):
+    with pytest.raises(FormatError, match="no archive that can be read"):
         read_motion(path)
 
 
