@@ -239,6 +239,11 @@ FAMILIES = {
         "rfemur rtibia rfoot rtoes",
         {"lhumerus": "l_shoulder", "rtibia": "r_knee"},
     ),
+    "mhr": (
+        "body_world root l_upleg l_lowleg l_foot l_talocrural l_ball l_upleg_twist0_proc c_spine0 c_spine1 "
+        "c_spine2 c_spine3 r_clavicle r_uparm r_lowarm r_wrist_twist r_wrist r_index1 c_neck c_head",
+        {"r_lowarm": "r_elbow", "l_ball": "l_metatarsal", "c_spine3": "vt4"},
+    ),
     "h-anim": (
         "HumanoidRoot sacroiliac l_hip l_knee l_ankle vl5 vt12 vc4 skullbase l_shoulder l_elbow l_wrist",
         {"vt12": "vt12", "l_elbow": "l_elbow"},

@@ -79,6 +79,10 @@ SPANISH = (
 BASIC = (
     "Root", "Torso", "Neck", "Head", "", "{}UpArm", "{}LowArm", "{}Hand", "{}UpLeg", "{}LowLeg", "{}Foot", "",
 )  # fmt: skip
+MHR = (
+    "root", "c_spine0 c_spine1 c_spine2 c_spine3", "c_neck", "c_head", "{}_clavicle", "{}_uparm", "{}_lowarm",
+    "{}_wrist", "{}_upleg", "{}_lowleg", "{}_foot", "{}_ball",
+)  # fmt: skip
 SHORT, DOT = ("L", "R"), ("l", "r")
 FINGERS = "{side}Hand{finger}{number}"
 
@@ -104,6 +108,8 @@ MAKERS = (
     Maker("unreal, upper case", tuple(part.upper() for part in UNREAL), ("L", "R"), rest="A", up="z"),
     Maker("unreal with twist bones", UNREAL, DOT, rest="A", twist="{}_twist_01", extra=("ik_foot_root",
           "ik_hand_gun")),
+    Maker("meta's human rig", MHR, DOT, rest="A", twist="{}_twist0_proc", finger="{side}_{finger}{number}",
+          fingers=("thumb", "index", "middle", "ring", "pinky")),
     Maker("biped", BIPED, SHORT, rest="N", order="YZX"),
     Maker("biped along +x", BIPED, SHORT, rest="X", up="z", unit=0.0254),
     Maker("daz in lower case", DAZ, DOT, rest="T", order="XZY"),
