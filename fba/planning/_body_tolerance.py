@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -11,9 +12,9 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32, Int64
 from fba.body import Skeleton
 from fba.body.displacement import displacements
-from fba.codec import EncoderOptions, decode, encode_animation, step_scale
+from fba.codec import ClampedParameter, EncoderOptions, decode, encode_animation, step_scale
 from fba.encoder_options import QUANT_MAX
-from fba.errors import RangeError
+from fba.errors import RangeError, Remedy
 from fba.parameters import BAP_COUNT, BAP_STANDARD_COUNT, FULL_TURN, bap_angles, bap_steps
 from fba.planning._body_rows import BodyTarget, all_rows, blocks
 from fba.planning._body_search import HOPELESS_ERROR, search_baps, turning_joints
@@ -56,6 +57,7 @@ def encode_body_within_tolerance(
     options = replace(options, clamp=True)
     smallest: tuple[bytes, NearLossless] | None = None
     nearest: BodyErrors | None = None
+    clamped: Mapping[str, ClampedParameter] = {}
     for sent, chosen in body_candidates(animation, tolerance, options, gaps=not every_frame):
         streams = [encode_animation(sent, chosen), encode_planned(sent, chosen)]
         for data, statistics in sorted(streams, key=lambda stream: len(stream[0])):
@@ -68,10 +70,10 @@ def encode_body_within_tolerance(
                 smallest = data, near
                 break
             if nearest is None or errors.largest < nearest.largest:
-                nearest = errors
+                nearest, clamped = errors, statistics.clamped_parameters
     if smallest is None:
         assert nearest is not None
-        raise beyond_body(nearest, tolerance)
+        raise beyond_body(nearest, tolerance, clamped)
     return smallest
 
 
@@ -211,14 +213,31 @@ def _to_send(animation: Animation, keys: Int64, values: Int32) -> Animation:
     return replace(animation, index=animation.index[keys], face=None, body=BodyTrack(values, mask))
 
 
-def beyond_body(nearest: BodyErrors, tolerance: Tolerance) -> RangeError:
-    """Return the error for a body beyond a tolerance. nearest: errors of the best stream."""
-    return RangeError(
+def beyond_body(
+    nearest: BodyErrors, tolerance: Tolerance, clamped: Mapping[str, ClampedParameter] = MappingProxyType({})
+) -> RangeError:
+    """Return the error for a body beyond a tolerance.
+
+    nearest: errors of the best stream. clamped: what no plane of it could carry, by parameter.
+    """
+    error = RangeError(
         f"no quantiser keeps the body within {tolerance.joint * 1000:g} mm, and feet that stand within "
         f"{tolerance.foot * 1000:g} mm: with the finest, a point 3 cm off {nearest.joint} is "
-        f"{nearest.largest * 1000:.2f} mm off, and a foot {nearest.foot * 1000:.2f} mm; allow that much",
+        f"{nearest.largest * 1000:.2f} mm off, and a foot {nearest.foot * 1000:.2f} mm; "
+        + ("; ".join(map(_beyond_range, clamped.items())) or "allow that much"),
         frame=nearest.frame,
     )
+    if not clamped:
+        return error
+    return error.with_remedies(
+        Remedy("bap_steps", "take the standard's steps, which reach further, with {}", "'iso'"),
+        Remedy("origin", "or let the body begin at the origin with {}", "'start'", "fba.read"),
+    )
+
+
+def _beyond_range(clamped: tuple[str, ClampedParameter]) -> str:
+    name, values = clamped
+    return f"{name} is {values.value} in frame {values.frame}, and a plane carries {values.sent} at most"
 
 
 def reduce_joints(target: BodyTarget, share: float) -> Float64:

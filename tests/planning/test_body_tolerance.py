@@ -108,6 +108,15 @@ def test_a_tolerance_that_no_quantiser_meets_is_an_error() -> None:
         encode_within_tolerance(body(GESTURE), Tolerance(), EncoderOptions(bap_steps="iso"))
 
 
+def test_a_body_too_far_from_its_origin_is_an_error_that_says_so() -> None:
+    far = GESTURE.copy()
+    far[:, NUMBERS["HumanoidRoot_tr_frontal"]] += 5_900
+    with pytest.raises(
+        RangeError, match=r"BAP 183 HumanoidRoot_tr_frontal is .* in frame 0.*bap_steps='iso'"
+    ):
+        encode_within_tolerance(body(far), Tolerance(), VISAGE)
+
+
 def test_short_and_still_bodies() -> None:
     one = body(GESTURE[5:6])
     data, near = encode_within_tolerance(one, Tolerance(), VISAGE)
