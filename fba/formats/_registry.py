@@ -19,7 +19,7 @@ from fba.errors import FbaWarning, FormatError, OptionError, Remedy, Unsupported
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BapTable
 from fba.recognition import recognition_hint
-from fba.source import Path, read_head
+from fba.source import Path, naming_file, read_head
 
 if TYPE_CHECKING:
     from fba.capture import Captured, FaceCapture, SkeletonMotion
@@ -98,7 +98,8 @@ class Format:
         if self.read_person is not None:
             given.pop("rate", None)
             return self.read_person(path, SkeletonOptions(**given), **asked)
-        capture = self._reader(path, **asked)
+        with naming_file(path):
+            capture = self._reader(path, **asked)
         return make_animation(capture, path=path, limits=options.get("limits", DEFAULT_LIMITS), **given)
 
     @property

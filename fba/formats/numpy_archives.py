@@ -27,9 +27,10 @@ def read_arrays(path: Path, limits: Limits, *, single: str, objects: bool = Fals
     """
     data = read_whole(path)
     if data.startswith(NPY):
-        return {single: _read_array(data, path, limits, objects)}
-    members = read_members(data, path, limits, lambda name: name.endswith(".npy"))
-    arrays = {name[:-4]: _read_array(content, path, limits, objects) for name, content in members}
+        arrays = {single: _read_array(data, path, limits, objects)}
+    else:
+        members = read_members(data, path, limits, lambda name: name.endswith(".npy"))
+        arrays = {name[:-4]: _read_array(content, path, limits, objects) for name, content in members}
     return {name: array for name, array in arrays.items() if array is not None}
 
 

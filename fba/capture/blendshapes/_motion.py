@@ -14,6 +14,9 @@ from fba.errors import ModelError
 from fba.sampling import find_gaps
 from fba.tracks import freeze
 
+MAX_ANGLE = 1000.0
+"""Largest angle of heads and eyes, in radians: many turns, as trackers count on."""
+
 
 @dataclass(frozen=True, eq=False)
 class ShapeMotion:
@@ -100,7 +103,7 @@ def _freeze(motion: ShapeMotion | ActionUnitMotion, amounts: str, count: int) ->
     """Make the arrays float64 and read-only, and the rate a fraction.
 
     amounts: name of the array (T, count) of what was recorded. Raises ModelError if arrays have other shapes
-    or are infinite, times do not increase, or the rate is not positive.
+    or are infinite, angles are beyond `MAX_ANGLE`, times do not increase, or the rate is not positive.
     """
     kind, rows = type(motion).__name__, len(motion.times)
     shapes = {amounts: (rows, count), "times": (rows,), "head": (rows, 3), "eyes": (rows, 4)}
@@ -113,6 +116,8 @@ def _freeze(motion: ShapeMotion | ActionUnitMotion, amounts: str, count: int) ->
             raise ModelError(f"{kind}: {name} has shape {array.shape}, not {shape}")
         if np.isinf(array).any():
             raise ModelError(f"{kind}: {name} must be finite, or NaN where no face was seen")
+        if name in ("head", "eyes") and (far := np.abs(array) > MAX_ANGLE).any():
+            raise ModelError(f"{kind}: {name} has an angle of {array[far][0]:g} rad; {MAX_ANGLE:g} at most")
         freeze(motion, **{name: array})
     freeze(motion, rate=Fraction(motion.rate))
     if motion.rate <= 0:

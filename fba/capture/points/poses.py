@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64
+from fba.errors import ModelError
 from fba.geometry import nearest_orthonormal
 from fba.rotations import turn
 
@@ -41,7 +42,8 @@ def fit_poses(shape: Float64, picture: Float64, trust: Float64 | None = None) ->
     """Return the pose of a head in each frame.
 
     shape: float64 (K, 3), its points, metres. picture: float64 (T, K, 2), these points in the picture, x to
-    the right, y up. trust: (K,), weights of the points; None for equal weights.
+    the right, y up. trust: (K,), weights of the points; None for equal weights. Raises ModelError for a frame
+    whose points do not show a pose.
     """
     trust = np.ones(len(shape)) if trust is None else trust
     middle = trust @ shape / trust.sum()
@@ -53,6 +55,10 @@ def fit_poses(shape: Float64, picture: Float64, trust: Float64 | None = None) ->
     rows = nearest_orthonormal(both)
     rotation = np.concatenate([rows, np.cross(rows[:, 0], rows[:, 1])[:, None]], axis=1)
     scale = np.einsum("tij,tij->t", rows, both) / 2
+    if not (scale > 0).all():
+        raise ModelError(
+            "the points of a frame lie all in one place, or on a line, as no face does"
+        )
     weights = np.broadcast_to(trust, picture.shape[:2])
     shift = centre
     for _ in range(PASSES):

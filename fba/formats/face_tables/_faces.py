@@ -208,7 +208,7 @@ def find_missing(intensities: Float64, times: Float64, rate: Fraction) -> list[s
 def _are_pictures(table: Table, seconds: int) -> bool:
     """Whether times are those of pictures whose times are unknown, a thousand of them in a second."""
     times = table.numbers([seconds])[:, 0]
-    return len(times) > 1 and bool(0 < np.median(np.diff(times)) * MAX_ROWS_A_SECOND <= 1)
+    return len(times) > 1 and bool(0 < np.median(np.diff(times)) <= 1 / MAX_ROWS_A_SECOND)
 
 
 def angle_unit(angles: Float64) -> tuple[float, list[str]]:

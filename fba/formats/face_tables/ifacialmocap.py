@@ -158,9 +158,9 @@ def _read_word(word: str, line: int, path: Path) -> tuple[str, list[float]]:
             )  # fmt: skip
         return name, numbers
     pair = PAIR.fullmatch(word)
-    if pair is None:
+    if pair is None or pair[1] in TURNS:
         known = re.match(r"([A-Za-z][A-Za-z0-9_]*)[-&]", word)
-        if known is not None and shape_of(known[1]) is None:
+        if known is not None and shape_of(known[1]) is None and known[1] not in (*TURNS, STATUS):
             return known[1], []  # a word of the app's own, such as a time code
         raise FormatError(
             "this is no weight; expected jawOpen-12 or jawOpen&12", path=path, line=line, token=word
