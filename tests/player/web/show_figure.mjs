@@ -8,14 +8,16 @@
 import { readFileSync, writeFileSync } from "node:fs";
 import { FbaError, decode } from "../../../player/fba_player/web/fba.js";
 import { Figure } from "../../../player/fba_player/web/figure/figure.js";
+import { isGlb } from "../../../player/fba_player/web/figure/glb.js";
+import { readHead } from "../../../player/fba_player/web/figure/glb_face.js";
 import { Resolver } from "../../../player/fba_player/web/figure/resolve.js";
 import { Timeline, framesOf } from "../../../player/fba_player/web/page/timeline.js";
 
 const request = JSON.parse(readFileSync(process.argv[2], "utf8"));
 if (request.damaged) {
-  writeFileSync(request.result, JSON.stringify(request.damaged.map(message)));
+  writeFileSync(request.result, JSON.stringify(await Promise.all(request.damaged.map(message))));
 } else {
-  const figure = new Figure(readFileSync(request.figure));
+  const figure = await read(request.figure);
   if (request.faces) {
     const resolver = new Resolver(figure.rules);
     const rows = request.faces.map((face) => {
@@ -59,9 +61,15 @@ function write(file, arrays) {
   writeFileSync(file, joined);
 }
 
-function message(file) {
+/** A packed figure, or a head as .glb. */
+async function read(file) {
+  const bytes = new Uint8Array(readFileSync(file));
+  return new Figure(isGlb(bytes) ? await readHead(bytes) : bytes);
+}
+
+async function message(file) {
   try {
-    const figure = new Figure(readFileSync(file));
+    const figure = await read(file);
     figure.show(new Float64Array(68).fill(100), new Float64Array(296).fill(1000));
     return "";
   } catch (error) {

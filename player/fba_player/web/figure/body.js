@@ -4,7 +4,7 @@ import { IDENTITY, invertRigid, multiply } from "./matrices.js";
 import { Shading, normalise, readParts } from "./parts.js";
 import { Skin } from "./skin.js";
 
-/** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Arrays} Container */
 /** @typedef {{joint: number, place: Float64Array}} SolePoint a point of a sole, relative to the joint that moves it */
 
 const BAPS = 296;

@@ -5,23 +5,24 @@ import { FbaError } from "../decoder/errors.js";
  * [type, rows, columns, first byte, coding] of an array.
  * @typedef {[string, number, number, number, string]} Entry
  * @typedef {{array: number, step: number, origin: number[]}} Fractions
+ * What gives arrays. @typedef {Pick<Container, "integers" | "fractions" | "indices" | "file">} Arrays
  * @typedef {Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Int32Array} Integers
  */
 
 const TYPES = { u1: Uint8Array, i1: Int8Array, u2: Uint16Array, i2: Int16Array, u4: Uint32Array, i4: Int32Array };
 const MAGIC = 0x57414246; // "FBAW"
 const START = 8;
-const MOST_NUMBERS = 64_000_000;
+export const MOST_NUMBERS = 64_000_000;
 
 /** @param {string} finding @returns {never} */
 export function refuse(finding) {
-  throw new FbaError("damage", `the model ${finding}`, undefined, undefined, "make the page again with fba export");
+  throw new FbaError("damage", `the model ${finding}`, undefined, undefined, "make it again with fba export");
 }
 
 /** Fail unless a number of a header is finite, and whole and below a limit where one is given. @param {unknown} value @param {string} what @param {number} [limit] @returns {number} */
 export function checkedNumber(value, what, limit) {
   const good = typeof value === "number" && Number.isFinite(value) && (limit === undefined || (Number.isInteger(value) && value >= 0 && value < limit));
-  return good ? value : refuse(`has ${JSON.stringify(value)} as ${what}${limit === undefined ? "" : `, expected 0 to ${limit - 1}`}`);
+  return good ? value : refuse(`has ${String(JSON.stringify(value)).slice(0, 60)} as ${what}${limit === undefined ? "" : `, expected 0 to ${limit - 1}`}`);
 }
 
 /** Return the column of a FAP. @param {unknown} fap its number, from 1 */
@@ -115,6 +116,14 @@ export class Container {
     return { type, rows, columns, bytes: this._bytes.subarray(start, start + size), coding: String(entry[4]) };
   }
 }
+
+/** The same access to arrays that are there already: whoever made the header put them in it. */
+export const MEMORY = /** @type {Arrays} */ ({
+  integers: (/** @type {any} */ place) => place,
+  fractions: (/** @type {any} */ reference) => reference,
+  indices: (/** @type {any} */ place) => place,
+  file: (/** @type {any} */ place) => place,
+});
 
 /** @param {Uint8Array} bytes */
 function parse(bytes) {

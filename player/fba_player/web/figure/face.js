@@ -3,8 +3,9 @@ import { checkedFap, checkedList, checkedNumber, checkedNumbers, refuse } from "
 import { IDENTITY, multiply, rotate, setColumns, turnVector } from "./matrices.js";
 import { Shading, readParts } from "./parts.js";
 import { Rules } from "./resolve.js";
+import { ShapeWeights } from "../loader/weights.js";
 
-/** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Arrays} Container */
 
 /**
  * What a FAP does to some vertices of a part: shapes, the first at `shape`, times curves over its value; curve c has at border b
@@ -51,6 +52,10 @@ export class Face {
       return shading;
     });
     this._faps = new Float64Array(FAPS);
+    /** What mixes the shapes of a head of another program, whose tracks are of shapes. */
+    this._mixer = header.weights ? new ShapeWeights(header.weights) : null;
+    /** Values of what moves vertices. @type {ArrayLike<number>} */
+    this._values = this._faps;
     this._touched = new Uint8Array(this.parts.length);
     this._was = new Uint8Array(this.parts.length);
     /** Turn of each part within the head, 16 numbers each, column by column. */
@@ -70,6 +75,7 @@ export class Face {
    */
   pose(faps) {
     this._faps.set(faps);
+    this._values = this._mixer?.of(faps) ?? this._faps;
     this.positions.set(this._rest);
     this._touched.fill(0);
     for (const track of this._tracks) this._move(track);
@@ -87,7 +93,7 @@ export class Face {
 
   /** @param {Track} track */
   _move({ column, part, borders, curves, count, row, rows, shape }) {
-    const value = this._faps[column];
+    const value = this._values[column];
     if (value === 0) return;
     this._touched[part] = 1;
     const { positions, _rows: moved } = this;
@@ -99,6 +105,10 @@ export class Face {
     for (let curve = 0, from = 3 * shape; curve < count; curve += 1) {
       const low = curves[curve * size + border - 1];
       const weight = (low + (curves[curve * size + border] - low) * share) * this._step;
+      if (weight === 0) {
+        from += 3 * rows;
+        continue;
+      }
       for (let at = row; at < row + rows; at += 1, from += 3) {
         const to = 3 * moved[at];
         positions[to] += weight * values[from];

@@ -30,10 +30,10 @@ const PUPILS = [28, 29]; // columns of FAPs 29 and 30
  * subject's left, +y up, +z forward; a person stands on y = 0, a head is where its model has it.
  */
 export class Figure {
-  /** @param {Uint8Array} bytes */
-  constructor(bytes) {
-    const container = new Container(bytes);
-    const { header } = container;
+  /** @param {Uint8Array | import("./glb_face.js").Content} source a packed figure, or what `readHead` returned */
+  constructor(source) {
+    const packed = source instanceof Uint8Array ? new Container(source) : null;
+    const { container, header } = packed ? { container: packed, header: packed.header } : /** @type {import("./glb_face.js").Content} */ (source);
     if (header.version !== VERSION) refuse(`is of version ${header.version}, expected ${VERSION}`);
     this.face = new Face(container, header.face ?? refuse("has no face"));
     this.body = header.body ? new Body(container, header.body) : null;

@@ -1,7 +1,7 @@
 /** The meshes of a figure: what they look like, and their normals as they move. */
 import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.js";
 
-/** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Arrays} Container */
 
 /**
  * A mesh of a figure, whose vertices are count from `first` on. positions, normals: three numbers each, in metres, which

@@ -2,7 +2,7 @@
 import { checkedList, checkedNumber, checkedNumbers } from "./container.js";
 import { multiply, quaternion } from "./matrices.js";
 
-/** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Arrays} Container */
 /** @typedef {{joint: number, child: number, count: number, centre: Float64Array, axis: Float64Array, childAxis: Float64Array}} Bone */
 /** @typedef {{joints: number[], centre: Float64Array, arm: Float64Array}} Girdle */
 

@@ -1,12 +1,14 @@
 /** The figures of a page: what a packed model is drawn as. */
 import { Figure } from "../figure/figure.js";
+import { isGlb } from "../figure/glb.js";
+import { readHead } from "../figure/glb_face.js";
 import { Resolver } from "../figure/resolve.js";
 import { IDENTITY, multiply } from "./matrix.js";
 
 /**
  * Figures to choose from: a head, a person or both. Of each its file, whether it has a body, and the pictures of its parts by
  * their place.
- * @typedef {{bytes: Uint8Array, hasBody: boolean, pictures: Map<number, ImageBitmap>}[]} Model
+ * @typedef {{source: Uint8Array | import("../figure/glb_face.js").Content, hasBody: boolean, pictures: Map<number, ImageBitmap>}[]} Model
  * @typedef {import("./renderer.js").Shape} Shape
  * @typedef {import("./camera.js").Subject} Subject
  * @typedef {import("./timeline.js").Timeline} Timeline
@@ -41,7 +43,8 @@ export function readModel(...files) {
 /** @param {Uint8Array} file */
 async function readFigure(file) {
   const bytes = file[0] === 0x1f && file[1] === 0x8b ? await unzipped(file) : file;
-  const figure = new Figure(bytes);
+  const source = isGlb(bytes) ? await readHead(bytes) : bytes;
+  const figure = new Figure(source);
   const pictures = new Map();
   for (const [place, { texture, name }] of figure.parts.entries()) {
     if (!texture) continue;
@@ -51,7 +54,7 @@ async function readFigure(file) {
       throw new Error(`the model's picture of part "${name}" cannot be decoded`);
     }
   }
-  return { bytes, hasBody: figure.body !== null, pictures };
+  return { source, hasBody: figure.body !== null, pictures };
 }
 
 /**
@@ -64,7 +67,7 @@ export function makeFigure(model, hasBody, hasFace) {
   if (hasBody && !hasFace && !chosen.hasBody) {
     throw new Error("the stream moves a body, and this page has a head alone; make the page again with fba export");
   }
-  const figure = new Figure(chosen.bytes);
+  const figure = new Figure(chosen.source);
   return { figure: new Drawn(figure, chosen.pictures), resolver: new Resolver(figure.rules) };
 }
 
