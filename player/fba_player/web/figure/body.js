@@ -126,6 +126,16 @@ export class Body {
    */
   pose(baps, headMatrix) {
     const { joints } = this;
+    this.turn(baps, headMatrix);
+    this._skin.apply(joints, this._rest, this._besides, this.positions, this.normals);
+    for (const { shading, positions, surface } of this._shadings) shading.update(positions, surface);
+    for (let at = 0; at < this.normals.length; at += 1) this.normals[at] += this._surface[at];
+    normalise(this.normals, this.normals);
+  }
+
+  /** Move joints and faceMatrix alone. @param {ArrayLike<number>} baps @param {Float64Array} headMatrix */
+  turn(baps, headMatrix) {
+    const { joints } = this;
     this._solver.pose(baps, joints);
     if (this._ground) {
       const { standard, standing, soles, joints: others } = this._ground;
@@ -134,10 +144,6 @@ export class Body {
       for (let at = 13; at < joints.length; at += 16) joints[at] += lift;
     }
     this._turnHead(headMatrix);
-    this._skin.apply(joints, this._rest, this._besides, this.positions, this.normals);
-    for (const { shading, positions, surface } of this._shadings) shading.update(positions, surface);
-    for (let at = 0; at < this.normals.length; at += 1) this.normals[at] += this._surface[at];
-    normalise(this.normals, this.normals);
   }
 
   /** @param {Float64Array} turn */

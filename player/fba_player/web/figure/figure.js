@@ -125,6 +125,13 @@ export class Figure {
     return this.parts.some(({ changed }) => changed);
   }
 
+  /** Return the joints of the body for BAPs, 16 numbers each, none without a body; nothing else moves. @param {ArrayLike<number>} baps */
+  turnJoints(baps) {
+    this._baps.fill(NaN); // the next call of `show` moves all
+    this.body?.turn(baps, this.face.headMatrix);
+    return this.body?.joints ?? [];
+  }
+
   /** @param {Body} body @param {boolean} sameFace */
   _showPerson(body, sameFace) {
     body.pose(this._baps, this.face.headMatrix);

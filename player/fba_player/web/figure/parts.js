@@ -53,7 +53,7 @@ function mesh(container, entry, count, what) {
       leaders[at] -= before[at];
     }
   }
-  return { name: String(entry.name), kind: String(entry.kind), count, triangles: Uint32Array.from(corners), leaders };
+  return { name: String(entry.name), kind: String(entry.kind), count, triangles: new Uint32Array(corners), leaders };
 }
 
 /** @param {Container} container @param {Record<string, any>} entry @param {number} count @param {string} what */
@@ -110,22 +110,34 @@ export class Shading {
   constructor({ triangles, positions: rest, leaders }, moving) {
     const count = rest.length / 3;
     this._group = leaders;
-    const corners = triangles.map((corner) => this._group[corner]);
+    const corners = new Uint32Array(triangles.length);
+    for (let at = 0; at < triangles.length; at += 1) corners[at] = leaders[triangles[at]];
     const sums = new Float32Array(3 * count);
     sum(triangles, corners, rest, sums);
     normalise(sums, sums);
     /** Neutral normals. */
-    this.rest = sums.map((_, at) => sums[3 * this._group[Math.floor(at / 3)] + (at % 3)]);
+    this.rest = new Float32Array(3 * count);
+    for (let vertex = 0; vertex < count; vertex += 1) {
+      for (let axis = 0; axis < 3; axis += 1) this.rest[3 * vertex + axis] = sums[3 * leaders[vertex] + axis];
+    }
     const changing = new Uint8Array(count);
     for (let at = 0; at < triangles.length; at += 3) {
       if (moving[triangles[at]] || moving[triangles[at + 1]] || moving[triangles[at + 2]]) {
         for (let corner = at; corner < at + 3; corner += 1) changing[corners[corner]] = 1;
       }
     }
-    const used = (/** @type {number} */ at) => changing[corners[at]] || changing[corners[at + 1]] || changing[corners[at + 2]];
-    const chosen = new Uint32Array(triangles.length / 3).map((_, at) => 3 * at).filter(used);
-    this._triangles = expandTriangles(triangles, chosen);
-    this._corners = expandTriangles(corners, chosen);
+    let used = 0;
+    this._triangles = new Uint32Array(triangles.length);
+    this._corners = new Uint32Array(triangles.length);
+    for (let at = 0; at < triangles.length; at += 3) {
+      if (!changing[corners[at]] && !changing[corners[at + 1]] && !changing[corners[at + 2]]) continue;
+      for (let corner = at; corner < at + 3; corner += 1, used += 1) {
+        this._triangles[used] = triangles[corner];
+        this._corners[used] = corners[corner];
+      }
+    }
+    this._triangles = this._triangles.subarray(0, used);
+    this._corners = this._corners.subarray(0, used);
     this._vertices = leaders.map((_, at) => at).filter((at) => changing[leaders[at]]);
     this._sums = sums;
   }
@@ -152,11 +164,6 @@ export class Shading {
       normals[to + 2] = still ? rest[to + 2] : z * scale;
     }
   }
-}
-
-/** @param {Uint32Array} corners @param {Uint32Array} chosen first corners of triangles */
-function expandTriangles(corners, chosen) {
-  return new Uint32Array(3 * chosen.length).map((_, at) => corners[chosen[Math.floor(at / 3)] + (at % 3)]);
 }
 
 /** Add the normal of each triangle, twice its area long, to its corners in sums. @param {Uint32Array} triangles @param {Uint32Array} corners @param {Float32Array} positions @param {Float32Array} sums */

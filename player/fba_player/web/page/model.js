@@ -6,9 +6,9 @@ import { Resolver } from "../figure/resolve.js";
 import { IDENTITY, multiply } from "./matrix.js";
 
 /**
- * Figures to choose from: a head, a person or both. Of each its file, whether it has a body, and the pictures of its parts by
- * their place.
- * @typedef {{source: Uint8Array | import("../figure/glb_face.js").Content, hasBody: boolean, pictures: Map<number, ImageBitmap>}[]} Model
+ * Figures to choose from: a head, a person or both. Of each its file, whether it has a body, the pictures of its parts by
+ * their place, and the figure for the first performance.
+ * @typedef {{source: Uint8Array | import("../figure/glb_face.js").Content, hasBody: boolean, pictures: Map<number, ImageBitmap>, spare: Figure | null}[]} Model
  * @typedef {import("./renderer.js").Shape} Shape
  * @typedef {import("./camera.js").Subject} Subject
  * @typedef {import("./timeline.js").Timeline} Timeline
@@ -54,7 +54,7 @@ async function readFigure(file) {
       throw new Error(`the model's picture of part "${name}" cannot be decoded`);
     }
   }
-  return { source, hasBody: figure.body !== null, pictures };
+  return { source, hasBody: figure.body !== null, pictures, spare: /** @type {Figure | null} */ (figure) };
 }
 
 /**
@@ -67,7 +67,8 @@ export function makeFigure(model, hasBody, hasFace) {
   if (hasBody && !hasFace && !chosen.hasBody) {
     throw new Error("the stream moves a body, and this page has a head alone; make the page again with fba export");
   }
-  const figure = new Figure(chosen.source);
+  const figure = chosen.spare ?? new Figure(chosen.source);
+  chosen.spare = null;
   return { figure: new Drawn(figure, chosen.pictures), resolver: new Resolver(figure.rules) };
 }
 
@@ -115,8 +116,7 @@ class Drawn {
     const count = this.hasBody ? Math.min(timeline.frames.length, SAMPLES) : 0;
     for (let k = 0; k < count; k += 1) {
       timeline.at(timeline.timeOf(Math.round((k * (timeline.frames.length - 1)) / Math.max(count - 1, 1))), faps, baps);
-      this._figure.show(faps, baps);
-      const joints = this._figure.body?.joints ?? [];
+      const joints = this._figure.turnJoints(baps);
       for (let at = 12; at < joints.length; at += 16) {
         for (let axis = 0; axis < 3; axis += 1) {
           low[axis] = Math.min(low[axis], joints[at + axis]);
@@ -225,22 +225,22 @@ function shapeOf(parts, count, pictureOf) {
   const colours = new Float32Array(4 * count);
   const texcoords = parts.some((part) => part.texcoords) ? new Float32Array(2 * count) : null;
   const across = parts.some((part) => part.across) ? new Float32Array(8 * count) : null;
-  const triangles = [];
+  const triangles = new Uint32Array(parts.reduce((sum, part) => sum + (part.ball ? 0 : part.triangles.length), 0));
   const drawn = [];
+  let corners = 0;
   for (const [place, part] of parts.entries()) {
-    for (let k = 0; k < part.count; k += 1) {
-      const light = part.colours ? part.colours.subarray(3 * k, 3 * k + 3) : part.colour;
-      colours.set(light, 4 * (part.first + k));
-      colours[4 * (part.first + k) + 3] = part.glosses ? part.glosses[k] : part.gloss;
+    for (let k = 0, to = 4 * part.first; k < part.count; k += 1, to += 4) {
+      for (let channel = 0; channel < 3; channel += 1) colours[to + channel] = part.colours ? part.colours[3 * k + channel] : part.colour[channel];
+      colours[to + 3] = part.glosses ? part.glosses[k] : part.gloss;
     }
     if (part.texcoords) texcoords?.set(part.texcoords, 2 * part.first);
     if (part.across) across?.set(part.across, 8 * part.first);
     const { scatter, closed, smooth, twoSided, opaque, alpha, opacity, cutoff, ball } = part;
     if (!ball) {
       const picture = part.texcoords ? pictureOf(place) : null;
-      drawn.push({ first: triangles.length, count: part.triangles.length, picture, opaque, scatter, twoSided, closed, hairs: part.across !== null, smooth, alpha, opacity, cutoff, wrinkled: false });
-      for (const corner of part.triangles) triangles.push(corner + part.first);
+      drawn.push({ first: corners, count: part.triangles.length, picture, opaque, scatter, twoSided, closed, hairs: part.across !== null, smooth, alpha, opacity, cutoff, wrinkled: false });
+      for (let at = 0; at < part.triangles.length; at += 1, corners += 1) triangles[corners] = part.triangles[at] + part.first;
     }
   }
-  return { count, triangles: Uint32Array.from(triangles), parts: drawn, colours, sway: new Float32Array(count).fill(1), texcoords, across, wrinklePlaces: null };
+  return { count, triangles, parts: drawn, colours, sway: new Float32Array(count).fill(1), texcoords, across, wrinklePlaces: null };
 }

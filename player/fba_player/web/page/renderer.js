@@ -50,6 +50,8 @@ const ATTRIBUTES = [
 const CORE_OPACITY = 0.9;
 const TINT = [0.075, 0.105, 0.1];
 const EYE_STEPS = 32;
+/** Options of the programs that the built-in figures need: begun while the figure is still unpacked. */
+const USUAL = [["SMOOTH"], ["SMOOTH", "HAIRS"], ["SMOOTH", "TEXTURED"]];
 
 /** Draws views on a canvas. Throws an error where there is no WebGL 2. */
 export class Renderer {
@@ -72,6 +74,9 @@ export class Renderer {
     this._eye = [0, 0, 0];
     this._camera = /** @type {import("./matrix.js").Matrix} */ (IDENTITY);
     this._pixel = 1;
+    this._program("studio", studioVertex, studioFragment);
+    this._program("eye", eyeVertex, eyeFragment);
+    for (const options of USUAL) this._program("face", faceVertex, faceFragment, options);
   }
 
   /** @param {View} view @param {import("./camera.js").Camera} camera */
@@ -200,13 +205,19 @@ export class Renderer {
 
   /** Return a program in use, with its camera set. @param {string} name @param {string} vertex @param {string} fragment @param {string[]} options */
   _use(name, vertex, fragment, options = []) {
-    const key = [name, ...options].join(" ");
-    let program = this._programs.get(key);
-    if (!program) this._programs.set(key, (program = new Program(this._gl, vertex, fragment, options)));
-    this._gl.useProgram(program.program);
+    const program = this._program(name, vertex, fragment, options);
+    program.use();
     program.set("eye", this._eye);
     program.matrix("camera", this._camera);
     program.set("pixel", this._pixel);
+    return program;
+  }
+
+  /** Return a program, which the driver may still be compiling. @param {string} name @param {string} vertex @param {string} fragment @param {string[]} [options] */
+  _program(name, vertex, fragment, options = []) {
+    const key = [name, ...options].join(" ");
+    let program = this._programs.get(key);
+    if (!program) this._programs.set(key, (program = new Program(this._gl, vertex, fragment, options)));
     return program;
   }
 }
@@ -239,11 +250,19 @@ class Program {
     ATTRIBUTES.forEach((name, place) => gl.bindAttribLocation(this.program, place, name));
     gl.bindAttribLocation(this.program, 0, "in_corner");
     gl.linkProgram(this.program);
+    /** @type {Map<string, {place: WebGLUniformLocation, type: number}> | null} */
+    this._uniforms = null;
+  }
+
+  /** Use it from now on; the first time this waits until it is compiled. */
+  use() {
+    const gl = this._gl;
+    gl.useProgram(this.program);
+    if (this._uniforms) return;
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost()) {
       const logs = (gl.getAttachedShaders(this.program) ?? []).map((shader) => gl.getShaderInfoLog(shader));
       throw new Error(`the graphics driver refuses a shader: ${[gl.getProgramInfoLog(this.program), ...logs].join(" ")}`);
     }
-    /** @type {Map<string, {place: WebGLUniformLocation, type: number}>} */
     this._uniforms = new Map();
     const count = gl.getProgramParameter(this.program, gl.ACTIVE_UNIFORMS);
     for (let k = 0; k < count; k += 1) {
@@ -260,7 +279,7 @@ class Program {
 
   /** Set a uniform, if the program has it: a number or vectors. @param {string} name @param {number | ArrayLike<number>} value */
   set(name, value) {
-    const [gl, uniform] = [this._gl, this._uniforms.get(name)];
+    const [gl, uniform] = [this._gl, this._uniforms?.get(name)];
     if (!uniform) return;
     const values = typeof value === "number" ? [value] : Float32Array.from(value);
     if (uniform.type === gl.FLOAT) gl.uniform1fv(uniform.place, values);
@@ -271,7 +290,7 @@ class Program {
 
   /** @param {string} name @param {import("./matrix.js").Matrix} value 9 or 16 numbers */
   matrix(name, value) {
-    const [gl, uniform] = [this._gl, this._uniforms.get(name)];
+    const [gl, uniform] = [this._gl, this._uniforms?.get(name)];
     if (!uniform) return;
     const values = Float32Array.from(value);
     if (values.length === 9) gl.uniformMatrix3fv(uniform.place, false, values);
@@ -354,16 +373,18 @@ class Buffers {
 function textureOf(gl, picture) {
   const texture = /** @type {WebGLTexture} */ (gl.createTexture());
   const canvas = new OffscreenCanvas(picture.width, picture.height);
-  const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
   context.drawImage(picture, 0, 0);
-  const pixels = context.getImageData(0, 0, picture.width, picture.height).data;
+  const pixels = new Uint8Array(context.getImageData(0, 0, picture.width, picture.height).data.buffer);
   const roots = Uint8Array.from({ length: 256 }, (_, value) => Math.round(255 * Math.sqrt(linear(value / 255))));
   for (let k = 0; k < pixels.length; k += 4) {
     const alpha = pixels[k + 3] / 255;
-    for (let channel = 0; channel < 3; channel += 1) pixels[k + channel] = roots[pixels[k + channel]] * alpha;
+    pixels[k] = roots[pixels[k]] * alpha;
+    pixels[k + 1] = roots[pixels[k + 1]] * alpha;
+    pixels[k + 2] = roots[pixels[k + 2]] * alpha;
   }
   gl.bindTexture(gl.TEXTURE_2D, texture);
-  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, picture.width, picture.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, picture.width, picture.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
   gl.generateMipmap(gl.TEXTURE_2D);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
   return texture;
