@@ -31,6 +31,7 @@ export function checkedFap(fap) {
 
 /** Return numbers of a header, as many as given. @param {unknown} values @param {string} what @param {number} [count] */
 export function checkedNumbers(values, what, count) {
+  if (values instanceof Float64Array) return values;
   if (!Array.isArray(values) || (count !== undefined && values.length !== count)) return refuse(`lacks the ${count ?? ""} numbers of ${what}`);
   return Float64Array.from(values, (value) => checkedNumber(value, what));
 }

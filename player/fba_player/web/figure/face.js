@@ -62,7 +62,6 @@ export class Face {
     this.partMatrices = this.parts.map(() => Float64Array.from(IDENTITY));
     /** Turn of the head, 16 numbers, column by column. */
     this.headMatrix = Float64Array.from(IDENTITY);
-    this._turn = Float64Array.from(IDENTITY);
     this._before = Float64Array.from(IDENTITY);
     this._bent = Float64Array.from(IDENTITY);
     this._combined = Float64Array.from(IDENTITY);
@@ -84,11 +83,11 @@ export class Face {
       this._before.set(this.partMatrices[at]);
       if (this._touched[at]) this._shadings[at].update(part.positions, part.normals);
       else if (this._was[at]) part.normals.set(this._shadings[at].rest);
-      this._compose(this._transforms[at], this.partMatrices[at]);
+      composeTurns(this._transforms[at], this._faps, this.partMatrices[at]);
       if (this._before.some((entry, place) => entry !== this.partMatrices[at][place])) part.changed = true;
     });
     this._was.set(this._touched);
-    this._compose(this._transforms[this.parts.length], this.headMatrix);
+    composeTurns(this._transforms[this.parts.length], this._faps, this.headMatrix);
   }
 
   /** @param {Track} track */
@@ -118,25 +117,6 @@ export class Face {
     }
   }
 
-  /** Write the product of transforms, the outermost first. @param {Transform[]} transforms @param {Float64Array} result */
-  _compose(transforms, result) {
-    result.set(IDENTITY);
-    for (const { column, kind, amount, centre } of transforms) {
-      const value = this._faps[column];
-      if (value === 0) continue;
-      const [x, y, z] = [value * amount[0], value * amount[1], value * amount[2]];
-      const { _turn: turn } = this;
-      turn.set(IDENTITY);
-      if (kind === "translation") setColumns(turn, 12, x, y, z);
-      else if (kind === "rotation") rotate(turn, x, y, z, centre);
-      else {
-        [turn[0], turn[5], turn[10]] = [1 + x, 1 + y, 1 + z];
-        setColumns(turn, 12, -x * centre[0], -y * centre[1], -z * centre[2]);
-      }
-      multiply(result, turn, result);
-    }
-  }
-
   /**
    * Write positions and normals, parts and head turned, in the frame of the model. bend: whether the neck bends, as players
    * show it; else all of the model turns with the head. withHead: false for the frame of the head.
@@ -157,6 +137,26 @@ export class Face {
         put(this._combined, this.normals, normals, 3 * start, 3 * next, 0);
       }
     }
+  }
+}
+
+const TURN = new Float64Array(16);
+
+/** Write the product of transforms, the outermost first. @param {Transform[]} transforms @param {ArrayLike<number>} faps @param {Float64Array} result */
+export function composeTurns(transforms, faps, result) {
+  result.set(IDENTITY);
+  for (const { column, kind, amount, centre } of transforms) {
+    const value = faps[column];
+    if (value === 0) continue;
+    const [x, y, z] = [value * amount[0], value * amount[1], value * amount[2]];
+    TURN.set(IDENTITY);
+    if (kind === "translation") setColumns(TURN, 12, x, y, z);
+    else if (kind === "rotation") rotate(TURN, x, y, z, centre);
+    else {
+      [TURN[0], TURN[5], TURN[10]] = [1 + x, 1 + y, 1 + z];
+      setColumns(TURN, 12, -x * centre[0], -y * centre[1], -z * centre[2]);
+    }
+    multiply(result, TURN, result);
   }
 }
 

@@ -2,19 +2,17 @@
 import { FbaError } from "../decoder/errors.js";
 import { FAP_NAMES, FAP_UNITS } from "../page/names.js";
 import { MEMORY, checkedList, checkedNumber, checkedNumbers } from "./container.js";
+import { PER_DISTANCE, fapNumber, listOf, measure, pointsOf, turnsOf } from "./fba_face.js";
 import { Glb, inflated, refuse } from "./glb.js";
-import { ADULT_EYES, PER_DISTANCE, Tracks, addSeams, commonHeader, eyeHeader, findBall, partHeader } from "./glb_parts.js";
+import { ADULT_EYES, Tracks, addSeams, commonHeader, eyeHeader, findBall, partHeader } from "./glb_parts.js";
 import { shapedFace } from "./glb_shapes.js";
 import { IDENTITY } from "./matrices.js";
 
 /** What a `Figure` is made of. @typedef {{container: typeof MEMORY, header: Record<string, any>}} Content */
-/** @typedef {import("./glb_parts.js").Point} Point */
+/** @typedef {import("./fba_face.js").Point} Point */
 
 const SIZES = [0.01, 1]; // metres between the eyes, from dolls to giants
-const RADIAN = 1e-5;
-const [MOST_PARTS, MOST_BORDERS, MOST_TURNS] = [1000, 4096, 10_000];
-const OUTWARD = ["translation", "rotation", "scale"];
-const [PITCH, ROLL] = [48, 50];
+const [MOST_PARTS, MOST_BORDERS] = [1000, 4096];
 const LIDS = [["3.1", "3.3", "3.7", "3.11"], ["3.2", "3.4", "3.12", "3.8"]];
 /** Numbers of links of an interpolation table besides the FAPs. */
 const FIELDS = ["viseme_select1", "viseme_select2", "viseme_blend", "expression_select1", "expression_intensity1", "expression_select2", "expression_intensity2"];
@@ -45,8 +43,7 @@ async function describedFace(glb, content) {
     return { name: String(name), kind: String(kind), primitive, header, ball };
   });
   const starts = pieces.map(((sum) => ({ header }) => (sum += header.count) - header.count)(0));
-  /** @type {Map<string, Point>} */
-  const points = new Map(Object.entries(content.featurePoints).map(([name, { position }]) => [name, checkedNumbers(position, "a feature point", 3)]));
+  const points = pointsOf(content);
   const bound = (/** @type {string} */ name) => {
     const { part, vertex } = content.featurePoints[name] ?? {};
     return vertex === undefined ? -1 : starts[checkedNumber(part, "the part of a feature point", pieces.length)] + checkedNumber(vertex, "the vertex of a feature point", pieces[part].header.count);
@@ -57,27 +54,15 @@ async function describedFace(glb, content) {
   const factor = apart >= SIZES[0] && apart <= SIZES[1] ? 1 : ADULT_EYES / apart;
   const common = commonHeader(pieces, eyes, apart, factor, middleOf(points, ["2.1", "2.10"]), middleOf(points, ["10.7", "10.8", "10.5", "10.6", "7.1"]), units.ENS * PER_DISTANCE);
   const tracks = new Tracks();
-  const transforms = [];
-  for (const { fap, meshes = [], transforms: turns = [] } of listOf(content.tables ?? [], "tables", 66)) {
+  for (const { fap, meshes = [] } of listOf(content.tables ?? [], "tables", 66)) {
     const number = fapNumber(fap);
     const unit = units[FAP_UNITS[number - 1]];
     for (const mesh of listOf(meshes, "meshes", pieces.length)) {
       const part = checkedNumber(mesh.part, "a part of a table", pieces.length);
       await addMesh(glb, mesh, number, pieces[part].header.count, starts[part], unit * factor, tracks);
     }
-    for (const { part, kind, amount, centre = [0, 0, 0] } of listOf(turns, "transforms", MOST_TURNS)) {
-      const scale = unit * (kind === "translation" ? factor : 1);
-      transforms.push({
-        part: part === undefined ? null : pieces[checkedNumber(part, "a part of a transform", pieces.length)].name,
-        kind,
-        fap: number,
-        amount: Array.from(checkedNumbers(amount, "a transform", 3), (step) => scale * step),
-        centre: Array.from(checkedNumbers(centre, "a centre", 3), (place) => factor * place),
-      });
-    }
   }
-  const rank = (/** @type {{kind: string, fap: number}} */ { kind, fap }) => 100 * OUTWARD.indexOf(kind) + (fap === PITCH ? ROLL + 0.5 : fap);
-  transforms.sort((one, other) => rank(one) - rank(other));
+  const transforms = turnsOf(content, units, factor).map(({ part, ...turn }) => ({ part: part === null ? null : pieces[part].name, ...turn }));
   const iris = units.IRISD * PER_DISTANCE;
   /** @type {Record<string, any>} */
   const header = {
@@ -92,26 +77,6 @@ async function describedFace(glb, content) {
   };
   addSeams(header, pieces.map(({ primitive }) => primitive.normals));
   return header;
-}
-
-/** @param {unknown} name of a low-level FAP */
-function fapNumber(name) {
-  const number = FAP_NAMES.indexOf(String(name)) + 1;
-  return number > 2 ? number : refuse(`names the FAP ${String(name).slice(0, 60)}, which does not exist`);
-}
-
-/** Return the units of FAPs, as `fba.face.Fapu`. @param {Map<string, Point>} points @returns {Record<string, number>} */
-function measure(points) {
-  const [x, y] = [0, 1].map((axis) => (/** @type {string} */ name) => points.get(name)?.[axis] ?? NaN);
-  const distances = {
-    IRISD: (y("3.1") - y("3.3") + y("3.2") - y("3.4")) / 2,
-    ES: x("3.5") - x("3.6"),
-    ENS: (y("3.5") + y("3.6")) / 2 - y("9.15"),
-    MNS: y("9.15") - y("2.2"),
-    MW: x("8.3") - x("8.4"),
-  };
-  for (const [unit, distance] of Object.entries(distances)) if (!(distance > 0)) refuse(`has ${distance} as ${unit}0, expected a distance above 0: its feature points are wrong`);
-  return { ...Object.fromEntries(Object.entries(distances).map(([unit, distance]) => [unit, distance / PER_DISTANCE])), AU: RADIAN };
 }
 
 /**
@@ -145,12 +110,6 @@ async function addMesh(glb, mesh, fap, size, start, unit, tracks) {
   }
   const places = [...borders.keys()].filter((border) => border !== zero);
   tracks.add(fap, borders, places.map((place) => borders.map((_, border) => Number(border === place))), rows, places.map((place) => shapes[place]));
-}
-
-/** @param {unknown} values @param {string} what @param {number} most */
-function listOf(values, what, most) {
-  const list = checkedList(values, what);
-  return list.length <= most ? list : refuse(`has ${list.length} ${what}, expected ${most} at most`);
 }
 
 /** Return the middle of the first two of points that there are, or null. @param {Map<string, Point>} points @param {string[]} names */

@@ -1,4 +1,5 @@
 /** What all heads of .glb files have: looks of their parts, round eyes, the bend of the neck, motion as tracks. */
+import { PER_DISTANCE } from "./fba_face.js";
 import { MEMORY } from "./container.js";
 import { Face } from "./face.js";
 import { MOST_VERTICES, refuse } from "./glb.js";
@@ -6,10 +7,10 @@ import { MOST_VERTICES, refuse } from "./glb.js";
 /**
  * @typedef {import("./glb.js").Primitive} Primitive
  * @typedef {import("./glb.js").Material} Material
- * @typedef {ArrayLike<number>} Point
+ * @typedef {import("./fba_face.js").Point} Point
  */
 
-export const [ADULT_EYES, PER_DISTANCE] = [0.062, 1024];
+export const ADULT_EYES = 0.062; // metres between them
 const MOST_SURFACES = 16; // that meet at one place
 const [SEAM_COSINE, SEAM_MOTION] = [0.7, 0.01];
 const [FEWEST, ROUNDNESS, FLAT] = [12, 0.03, 0.3]; // of an eyeball: vertices, error, depth by width

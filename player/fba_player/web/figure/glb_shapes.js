@@ -8,6 +8,7 @@ import { normalise } from "./parts.js";
 
 /** @typedef {import("./glb.js").Glb} Glb */
 /** @typedef {import("./glb.js").Primitive} Primitive */
+/** @typedef {import("./glb.js").Material} Material */
 
 const RADIAN = 1e-5;
 const [PITCH, YAW, ROLL] = [48, 49, 50];
@@ -31,6 +32,16 @@ const KINDS = [
 const UNITS = [1, 0.1, 0.01, 0.001, 0.0254]; // metres of metres, decimetres, centimetres, millimetres, inches
 const SIZES = [0.04, 0.08]; // metres between the eyes of people
 const IRIS = 0.0118; // metres, of an adult
+/** Colour and roughness of parts that have none of their own. @type {Record<string, [number, number, number, number]>} */
+const LOOKS = {
+  skin: [0.71, 0.47, 0.36, 0.55],
+  teeth: [0.83, 0.8, 0.72, 0.25],
+  tongue: [0.55, 0.16, 0.15, 0.4],
+  mouth: [0.35, 0.1, 0.09, 0.4],
+  brow: [0.06, 0.04, 0.03, 0.8],
+  lash: [0.02, 0.015, 0.01, 0.8],
+  hair: [0.06, 0.04, 0.03, 0.6],
+};
 const MOVED = 0.5; // share of the largest motion from which a vertex shows where a shape is
 
 /** Return a face that ARKit's shapes move, as `fba.capture.to_blendshapes` mixes them. @param {Glb} glb */
@@ -51,6 +62,8 @@ export function shapedFace(glb) {
       primitive.targets.forEach((shift, at) => shift && given[at] && !shapes.has(given[at]) && shapes.set(given[at], shift));
       for (const shape of shapes.keys()) names.add(shape);
       place(glb, node, number, primitive, facing);
+      const shades = [...material.colour, 0];
+      primitive.colours = primitive.colours && primitive.colours.map((value, at) => (at % 4 < 3 ? value * shades[at % 4] : 1 - material.roughness));
       const kind = KINDS.find(([words]) => words.test(name))?.[1] ?? (shapes.size ? "skin" : "other");
       return { name: `${name} ${number}`, kind, primitive, material, shapes };
     });
@@ -58,7 +71,7 @@ export function shapedFace(glb) {
   if (!names.has("eyeBlinkLeft") || !names.has("eyeBlinkRight")) refuse("has neither FBA_face nor morph targets named as ARKit's shapes, such as eyeBlinkLeft and jawOpen", "unsupported");
   const shown = pieces.filter(({ kind }) => kind !== "none").map((piece) => {
     const ball = piece.kind === "eye" ? findBall(piece.primitive.positions) : null;
-    return { ...piece, ball, header: partHeader(piece.name, piece.kind, piece.primitive, { ...piece.material, alpha: piece.material.alpha ?? "opaque" }, ball !== null) };
+    return { ...piece, ball, header: partHeader(piece.name, piece.kind, piece.primitive, { ...looks(piece), alpha: piece.material.alpha ?? "opaque" }, ball !== null) };
   });
   const lids = ["eyeBlinkLeft", "eyeBlinkRight"].map((shape) => middleOfMotion(shown, shape));
   const balls = shown.flatMap(({ ball }) => (ball ? [ball] : [])).sort((one, other) => other.centre[0] - one.centre[0]);
@@ -90,6 +103,14 @@ export function shapedFace(glb) {
   const content = { ...header, centre: neck, points: {}, eyes: found, definitions: DEFINITIONS, fit: [], weights, transforms, ...tracks.header() };
   addSeams(content, shown.map(({ primitive }) => primitive.normals));
   return content;
+}
+
+/** Return the material of a part, that of its kind where it has only the light grey of programs. @param {{kind: string, primitive: Primitive, material: Material}} piece */
+function looks({ kind, primitive, material }) {
+  const [red, green, blue] = material.colour;
+  const plain = !material.texture && !primitive.colours && Math.min(red, green, blue) > 0.5 && Math.max(red, green, blue) - Math.min(red, green, blue) < 0.03;
+  if (!plain || !LOOKS[kind]) return material;
+  return { ...material, colour: LOOKS[kind].slice(0, 3), roughness: LOOKS[kind][3] };
 }
 
 /** Put a mesh where its node, or the joints of its skin, have it. @param {Glb} glb @param {Record<string, any>} node @param {number} number @param {Primitive} primitive @param {number} facing 1, or -1 for what looks backwards */
