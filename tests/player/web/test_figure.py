@@ -21,6 +21,7 @@ from fba.body import BodyModel, GroundedPoser
 from fba.capture.blendshapes import to_blendshapes
 from fba.face import FaceModel, Function, InterpolationTable, Link, Term, resolve
 from fba.face.shape_names import canonical_names
+from fba.formats.gltf.bodies import import_body
 from fba.geometry import fit_similarity
 from fba.gltf import Surface, read_gltf, surfaces
 from fba.tracks import FaceTrack
@@ -30,6 +31,8 @@ from fba_player._figure.model_units import prepare_model, resize
 from fba_player._figure.person import Person, build_person
 from fba_player.view._geometry import rotation_vector
 from fba_player.web._packing import DETAIL, Packed, pack_figure
+from gltf_edits import edit
+from small_people import write_person
 from tools.web import make_tables
 from zoo_heads import ACTIONS, MAKERS, Maker, original
 from zoo_heads import write as write_head
@@ -38,6 +41,7 @@ needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="no node he
 pytestmark = pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 SAMPLES = Path(fba.__file__).parent / "samples"
 VECTORS = Path(__file__).parents[4] / "shared" / "vectors" / "generated"
+FOREIGN = VECTORS.parents[1] / "data" / "foreign" / "heads"
 STREAMS = 20
 TRACKS = 4
 MUTANTS = 60
@@ -135,6 +139,33 @@ def test_all_details(tmp_path: Path) -> None:
     packed = pack_figure(figure, None, 0)
     assert packed.face_rows.tolist() != sorted(packed.face_rows) == list(range(len(figure.model.vertices)))
     _check(compare("head", [fba.encode(fba.read(SAMPLES / "hello.fap"))], tmp_path, packed=packed))
+
+
+@needs_node
+@pytest.mark.parametrize("file", ["small", "rpm64f1.glb"])
+def test_bodies_with_a_head_of_their_own(file: str, tmp_path: Path) -> None:
+    """Their faces move as FAPs mix their shapes, their eyes turn."""
+    if file == "small":
+        morphs = {name: [0.0] for name in ("jawOpen", "eyeBlink_L", "mouthSmileRight", "eyeWideLeft")}
+        path = write_person(tmp_path / "person.glb", extension="VRMC_vrm", morphs=morphs)
+        edit(path, _left_hand_as_eye)
+    elif not (path := FOREIGN / file).is_file():
+        pytest.skip("no such file here")
+    figure, _ = _head()
+    person = build_person(import_body(path), figure)
+    assert person.head is None
+    assert person.body.own_head is not None
+    packed = pack_figure(figure, person)
+    talk, walk = (fba.read(SAMPLES / name) for name in ("hello.fap", "hello.bvh"))
+    count = min(len(talk), len(walk))
+    both = replace(walk[:count], face=talk[:count].face)
+    errors = compare("person", [fba.encode(both)], tmp_path, frames=20, packed=packed, figure=person)
+    _check(errors)
+
+
+def _left_hand_as_eye(document: dict[str, Any]) -> None:
+    bones = document["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"]
+    bones["leftEye"] = bones.pop("leftMiddleProximal")
 
 
 def _as_packed(data: bytes, model: FaceModel) -> Packed:
@@ -389,7 +420,13 @@ def _compare_person(
     errors.add("turn", np.arctan2(np.linalg.norm(apart, axis=0), np.trace(between, axis1=1, axis2=2) - 1))
     errors.add("joints", _distances(found[:, :3, 3], joints[:, :3, 3]))
     positions, normals = row[count:].reshape(2, -1, 3)
-    assert person.head is not None
+    if person.head is None:
+        assert person.body.own_head is not None
+        moved = person.body.own_head.move(person.body.vertices, faps)
+        body, body_normals = np.empty_like(moved), np.empty_like(moved)
+        person.body.skinner.skin_vertices(moved, person.body.normals, joints, body, body_normals)
+        errors.add("vertices", _distances(positions, body[packed.body_rows]))
+        return
     pose = person.figure.pose(faps)
     body, face = np.empty_like(person.body.vertices), np.empty_like(pose.normals)
     body_normals, face_normals = np.empty_like(body), np.empty_like(face)

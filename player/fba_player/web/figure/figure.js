@@ -134,7 +134,7 @@ export class Figure {
 
   /** @param {Body} body @param {boolean} sameFace */
   _showPerson(body, sameFace) {
-    body.pose(this._baps, this.face.headMatrix);
+    body.pose(this._baps, this.face.headMatrix, this._faps);
     for (const part of this.parts) part.changed = true;
     if (!this._skin || !this._placed || !this._local) return;
     if (!sameFace) {
