@@ -45,7 +45,7 @@ def pack_face(model: FaceModel, *, detail: float = DETAIL) -> bytes:
 def pack_body(body: BodyModel, face: FaceModel | None = None, *, detail: float = DETAIL) -> bytes:
     """Return a person as the web player reads it: a body with a face on it, by default the built-in head.
 
-    A body without a place for a face keeps its own head, which FAPs only turn. detail: see `pack_face`.
+    A body without a place for a face keeps its own head, whose shapes FAPs mix. detail: see `pack_face`.
     """
     figure = build_figure(prepare_model(face or FaceModel.default()))
     return pack_figure(figure, build_person(body, figure), detail).data

@@ -10,7 +10,10 @@ import subprocess
 import wave
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -23,6 +26,9 @@ from fba.animation import Animation, FaceTrack
 from fba.cli.main import group
 from fba.serving import Server, show_file, split_stream
 from fba_player.export.page import PageStream, make_page
+from gltf_edits import edit
+from zoo_heads import MAKERS, original
+from zoo_heads import write as write_head
 
 SAMPLES = Path(__file__).parents[3] / "fba" / "samples"
 MODULES = Path(__file__).parents[3] / "player" / "fba_player" / "web" / "node_modules"
@@ -288,3 +294,60 @@ def test_live(browse: Browse, hello: Animation) -> None:
         )
     assert results["errors"] == []
     assert results["results"][2:] == [False, True, "hello", "hello<b>other"]
+
+
+def test_glb_heads_in_the_element(browse: Browse, hello: Animation, tmp_path: Path) -> None:
+    """A head with FBA_face, one with ARKit's shapes, and one that needs what is not read."""
+    site = tmp_path / "site"
+    site.mkdir()
+    original("grid").save(site / "described.glb")
+    write_head(MAKERS[0], "grid", site / "shaped.glb")
+    shutil.copy(site / "shaped.glb", site / "packed.glb")
+    needs = {"extensionsRequired": ["KHR_draco_mesh_compression"]}
+    edit(site / "packed.glb", lambda document: document.update(needs))
+    shutil.copy(MODULES.parent / "dist" / "fba-player.min.js", site)
+    (site / "hello.fba").write_bytes(fba.encode(hello))
+    (site / "index.html").write_text(
+        '<!doctype html><link rel="icon" href="data:,">'
+        '<script type="module" src="fba-player.min.js"></script>'
+        '<fba-player src="hello.fba" model="described.glb" controls></fba-player>'
+    )
+
+    def show(model: str) -> str:
+        steps = (
+            "const ready = new Promise((done) => (p.onready = done))",
+            "for (const name of ['loadeddata', 'error']) p.addEventListener(name, p.onready, { once: true })",
+            f"p.setAttribute('model', '{model}')",
+            "p.setAttribute('src', 'hello.fba')",
+            "await ready",
+            "return p.error?.message ?? ''",
+        )
+        return f"(async (p) => {{ {'; '.join(steps)} }})({PLAYER})"
+
+    handler = partial(_Quiet, directory=str(site))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            results = browse(
+                f"http://127.0.0.1:{server.server_port}/index.html",
+                [
+                    {"wait": f"{PLAYER}?.readyState === 4 || {PLAYER}?.error"},
+                    {"run": f"{PLAYER}.error?.message ?? ''"},
+                    {"run": show("shaped.glb")},
+                    {"run": show("packed.glb")},
+                    {"run": f"{PLAYER}.shadowRoot.querySelector('.message').textContent"},
+                ],
+            )
+        finally:
+            server.shutdown()
+            thread.join()
+    assert results["errors"] == []
+    assert results["results"][1:3] == ["", ""]
+    assert "KHR_draco_mesh_compression" in results["results"][3]
+    assert "fba export --model head.glb -o head.fbam" in results["results"][4]
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *_: object) -> None:
+        pass
