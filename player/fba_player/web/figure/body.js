@@ -97,7 +97,8 @@ export class Body {
       return { shading, positions: part.positions, surface };
     });
     /** What the normals as modelled are besides those of the triangles. */
-    this._besides = modelled.map((number, at) => number - this._surface[at]);
+    this._besides = modelled;
+    for (let at = 0; at < modelled.length; at += 1) this._besides[at] -= this._surface[at];
     this._skin = new Skin(container, header.skin, this._rest.length / 3, count, parents, this.inverse);
     this._ground = header.standard ? readGround(header, this._solver) : null;
     const skull = checkedNumber(header.skull, "the skull", count);

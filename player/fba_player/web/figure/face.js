@@ -36,7 +36,8 @@ export class Face {
     this.points = new Map(Object.entries(header.points ?? {}).map(([name, place]) => [name, checkedNumbers(place, "a feature point", 3)]));
     /** Where the head turns about. */
     this.centre = checkedNumbers(header.centre, "the centre of the head", 3);
-    this._sway = container.fractions(header.sway, "the sway of the neck", count, 1);
+    /** How far each vertex turns with the head. */
+    this.sway = container.fractions(header.sway, "the sway of the neck", count, 1);
     this._rows = container.indices(header.rows, "the rows of the motion", count, undefined, 1);
     this._shapes = container.integers(header.shapes?.array, "the shapes of the motion");
     this._step = checkedNumber(header.shapes.step, "the step of the motion");
@@ -139,8 +140,8 @@ export class Face {
       const { first, count } = this.parts[number];
       const stop = first + count;
       for (let start = first, next = first; start < stop; start = next) {
-        const share = bends ? this._sway[start] : 1;
-        while (next < stop && (!bends || this._sway[next] === share)) next += 1;
+        const share = bends ? this.sway[start] : 1;
+        while (next < stop && (!bends || this.sway[next] === share)) next += 1;
         if (share < 1) rotate(this._bent, x * share, y * share, z * share, this.centre);
         multiply(!withHead ? IDENTITY : share < 1 ? this._bent : this.headMatrix, this.partMatrices[number], this._combined);
         put(this._combined, this.positions, positions, 3 * start, 3 * next, 1);
