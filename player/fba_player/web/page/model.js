@@ -18,7 +18,7 @@ const LARGEST_PUPIL = 0.92; // of the iris
 const OPEN_LIDS = [0, 0.5, 0.86, 0, -0.5, 0.86, 1, 0, 0.3, -1, 0, 0.3];
 const MOST_LIMBS = 12; // as in face.vert
 const FAR = -1e4; // metres: the place of limbs that a body lacks, away from the light
-const SAMPLES = 24; // moments at which the reach of a body is measured
+const SAMPLES = 48; // moments at which the reach of a body is measured
 const FARTHEST = 4; // metres that a person moves before the camera follows
 /** Joints with a shadow: radius (m), darkness, and height at rest (m). @type {Record<string, [number, number, number]>} */
 const SHADOWS = {
@@ -110,10 +110,12 @@ class Drawn {
   measure(timeline) {
     const [faps, baps] = [new Float32Array(68), new Float64Array(296)];
     const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+    const path = [];
     const count = this.hasBody ? Math.min(timeline.frames.length, SAMPLES) : 0;
     for (let k = 0; k < count; k += 1) {
-      timeline.at(timeline.timeOf(Math.round((k * (timeline.frames.length - 1)) / Math.max(count - 1, 1))), faps, baps);
+      timeline.at(timeline.timeOf(Math.floor((k * (timeline.frames.length - 1)) / Math.max(count - 1, 1))), faps, baps);
       const joints = this._figure.turnJoints(baps);
+      path.push(this.root);
       for (let at = 12; at < joints.length; at += 16) {
         for (let axis = 0; axis < 3; axis += 1) {
           low[axis] = Math.min(low[axis], joints[at + axis]);
@@ -129,12 +131,22 @@ class Drawn {
       return;
     }
     this.follows = Math.max(...high.map((value, axis) => value - low[axis])) > FARTHEST;
-    const root = this.root;
-    const wide = this.follows ? 0.62 : Math.max(Math.hypot(high[0] - low[0], high[2] - low[2]) / 2 + 0.14, 0.62);
-    const top = this.follows ? root[1] + 0.89 : Math.max(high[1] + 0.24, 1);
-    const bottom = this.follows ? root[1] - 1.07 : Math.min(low[1] - 0.06, -0.07);
-    const [x, z] = this.follows ? [root[0], root[2]] : [(low[0] + high[0]) / 2, (low[2] + high[2]) / 2];
-    this.bodySubject = { centre: [x, (bottom + top) / 2, z], halfHeight: Math.max(((top - bottom) / 2) * 1.06, 0.9), halfWidth: wide };
+    if (this.follows) {
+      const [x, y, z] = this.root;
+      this.bodySubject = { centre: [x, y - 0.09, z], halfHeight: 0.98, halfWidth: 0.62 };
+      return;
+    }
+    const standing = [(low[0] + high[0]) / 2 - 0.35, -0.07, (low[2] + high[2]) / 2 - 0.3];
+    [0.1, 0.06, 0.1].forEach((room, axis) => (low[axis] = Math.min(low[axis] - room, standing[axis])));
+    [0.1, 0.14, 0.1].forEach((room, axis) => (high[axis] += room)); // the head is above its joint
+    const centre = low.map((value, axis) => (value + high[axis]) / 2);
+    const towards = Math.max(...path.map(([x, , z]) => Math.hypot(x - centre[0], z - centre[2])));
+    this.bodySubject = {
+      centre,
+      halfHeight: Math.max(((high[1] - low[1]) / 2) * 1.06, 0.9),
+      halfWidth: Math.max(Math.hypot(high[0] - low[0], high[2] - low[2]) / 2, 0.62),
+      halfDepth: Math.max(towards - 0.12, 0),
+    };
   }
 
   /** Where the root of the body is in the last pose. */
