@@ -40,9 +40,9 @@ RELIEF_QUALITY = 50
 def pack_face_light(container: Container, figure: FaceFigure, rows: Int64) -> dict[str, Any]:
     """Return the light on the vertices (W,) of a face's model, which `figure/light.js` puts together.
 
-    "shut": of each vertex `VISIBLE` numbers, `THROUGH` numbers and the open share of the sky, with the mouth
-    shut; "wide": what these change by at the vertices `near` with the mouth wide open; "basis": the weights of
-    the numbers, as sums of 16 harmonics of a direction; "lips": the vertices between which `gaps` are measured
+    "shut": `VISIBLE` numbers a vertex, `THROUGH` numbers and the open share of the sky, with the mouth shut;
+    "wide": what these change by at the vertices `near` with the mouth wide open; "basis": weights of the
+    numbers, as sums of 16 harmonics of a direction; "lips": the vertices between which `gaps` are measured
     (m); "reach": how far (m) a tongue is out when light falls on it freely.
     """
     baked = figure.light.baked
@@ -93,7 +93,7 @@ def _directions() -> list[Float64]:
 
 
 def pack_wrinkles(container: Container, figure: FaceFigure, rows: Int64) -> dict[str, Any] | None:
-    """Return the wrinkles of a face: their map, where vertices lie in it, and what FAPs bring out; or None."""
+    """Return the wrinkles of a face: their map, where vertices lie in it, what FAPs bring out; or None."""
     places = np.full((len(figure.model.vertices), 2), OUTSIDE_OF_MAP)
     for name, shape in figure.shapes.items():
         if shape.wrinkle_places is not None:
