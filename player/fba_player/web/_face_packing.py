@@ -17,7 +17,7 @@ import numpy as np
 
 from fba.arrays import Float64, Int32, Int64, Integer
 from fba.body import BodyPart
-from fba.face import FaceDefMesh, FaceModel, InterpolationTable, Part, Term, feature_point_names
+from fba.face import FaceDefMesh, FaceModel, InterpolationTable, Part, Term
 from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
 from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS, faps
 from fba_player._figure.face import FaceFigure
@@ -187,16 +187,10 @@ def pack_face_parts(
         "positions": container.add_fractions(model.vertices[reduced.rows], STEP * size, centred=True),
         "sway": container.add_fractions(sways[reduced.rows][:, None], SWAY_STEP),
         "centre": figure.centre.tolist(),
-        "scale": rounded(size),
         "subject": {
             "centre": list(subject.centre),
             "halfHeight": subject.half_height,
             "halfWidth": subject.half_width,
-        },
-        "points": {
-            name: place.tolist()
-            for name, place in zip(feature_point_names(), model.points, strict=True)
-            if np.isfinite(place).all()
         },
         "eyes": [
             {

@@ -30,10 +30,6 @@ export class Face {
     this.parts = readParts(container, header.parts, this.positions, this.normals);
     /** How the face fills in what is not sent; see `Resolver`. */
     this.rules = new Rules(header);
-    /** 1 for an adult's size. */
-    this.scale = checkedNumber(header.scale, "the scale of the face");
-    /** Positions of feature points by name. @type {Map<string, Float64Array>} */
-    this.points = new Map(Object.entries(header.points ?? {}).map(([name, place]) => [name, checkedNumbers(place, "a feature point", 3)]));
     /** Where the head turns about. */
     this.centre = checkedNumbers(header.centre, "the centre of the head", 3);
     /** How far each vertex turns with the head. */
@@ -59,14 +55,12 @@ export class Face {
     /** Turn of the head, 16 numbers, column by column. */
     this.headMatrix = Float64Array.from(IDENTITY);
     this._turn = Float64Array.from(IDENTITY);
-    this._before = Float64Array.from(IDENTITY);
     this._bent = Float64Array.from(IDENTITY);
     this._combined = Float64Array.from(IDENTITY);
   }
 
   /**
-   * Move the face: positions, normals, partMatrices and headMatrix, and `changed` of its parts. faps: 68 numbers, as a
-   * `Resolver` gives them.
+   * Move the face: positions, normals, partMatrices and headMatrix. faps: 68 numbers, as a `Resolver` gives them.
    * @param {ArrayLike<number>} faps
    */
   pose(faps) {
@@ -75,12 +69,9 @@ export class Face {
     this._touched.fill(0);
     for (const track of this._tracks) this._move(track);
     this.parts.forEach((part, at) => {
-      part.changed = this._touched[at] + this._was[at] > 0;
-      this._before.set(this.partMatrices[at]);
       if (this._touched[at]) this._shadings[at].update(part.positions, part.normals);
       else if (this._was[at]) part.normals.set(this._shadings[at].rest);
       this._compose(this._transforms[at], this.partMatrices[at]);
-      if (this._before.some((entry, place) => entry !== this.partMatrices[at][place])) part.changed = true;
     });
     this._was.set(this._touched);
     this._compose(this._transforms[this.parts.length], this.headMatrix);

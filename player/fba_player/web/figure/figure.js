@@ -52,11 +52,10 @@ export class Figure {
     /** The face's parts as they are shown: their positions are in the world. */
     const shown = this.face.parts.map((part) => {
       const range = /** @type {[number, number]} */ ([3 * part.first, 3 * (part.first + part.count)]);
-      return { ...part, positions: this._positions.subarray(...range), normals: this._normals.subarray(...range), changed: true };
+      return { ...part, positions: this._positions.subarray(...range), normals: this._normals.subarray(...range) };
     });
     /** All parts, to be drawn. @type {Part[]} */
     this.parts = [...(this.body?.parts ?? []), ...shown];
-    this._shown = shown;
     /** The same by body and face, for those who draw all at once. @type {Mesh[]} */
     this.meshes = [];
     if (this.body) {
@@ -106,8 +105,6 @@ export class Figure {
     this.subject = { centre: checkedNumbers(centre, "the middle of the head", 3), halfHeight: checkedNumber(halfHeight, "the height"), halfWidth: checkedNumber(halfWidth, "the width") };
     this._faps = new Float64Array(FAPS).fill(NaN);
     this._baps = new Float64Array(this.body ? BAPS : 0).fill(NaN);
-    this._before = new Float64Array(16);
-    this._stood = new Float64Array(16);
     this._nothing = new Float64Array(BAPS);
     this.show(new Float64Array(FAPS));
   }
@@ -123,28 +120,24 @@ export class Figure {
   }
 
   /**
-   * Move the figure: positions and normals of `parts`, whose `changed` says which moved since the last call. Return whether
-   * any did.
+   * Move the figure: positions and normals of `parts`, and the light on them.
    * @param {ArrayLike<number>} faps 68, as a `Resolver` gives them @param {ArrayLike<number>} [baps] 296, for a body
    */
   show(faps, baps = this._nothing) {
     const sameFace = same(this._faps, faps);
     const sameBody = same(this._baps, baps);
-    for (const part of this.parts) part.changed = false;
-    if (sameFace && sameBody) return false;
+    if (sameFace && sameBody) return;
     this._faps.set(faps);
     this._baps.set(this.body ? baps : []);
-    this._before.set(this.faceMatrix);
     if (!sameFace) this.face.pose(faps);
     if (this.body) this._showPerson(this.body, sameFace);
-    else this._showHead();
+    else this.face.place(this._positions, this._normals);
     for (const eye of this._eyes) {
       multiply(this.faceMatrix, this.face.partMatrices[eye.number], eye.matrix);
       eye.pupil = eye.widest + eye.step * this._faps[PUPILS[eye.side]];
     }
     this._light?.shade(this.face.positions, this.faceMatrix, this.body ? this.faceMatrix : IDENTITY);
     if (!sameFace) this._wrinkles?.show(faps);
-    return this.parts.some(({ changed }) => changed);
   }
 
   /** Return the joints of the body for BAPs, 16 numbers each, none without a body; nothing else moves. @param {ArrayLike<number>} baps */
@@ -157,19 +150,12 @@ export class Figure {
   /** @param {Body} body @param {boolean} sameFace */
   _showPerson(body, sameFace) {
     body.pose(this._baps, this.face.headMatrix);
-    for (const part of this.parts) part.changed = true;
     if (!this._skin || !this._placed || !this._local) return;
     if (!sameFace) {
       this.face.place(this._positions, this._local, { withHead: false });
       body.placeFace(this._positions, this._placed);
     }
     this._skin.apply(body.joints, this._placed, this._local, this._positions, this._normals);
-  }
-
-  _showHead() {
-    const turned = this.faceMatrix.some((entry, at) => entry !== this._before[at]);
-    this.face.place(this._positions, this._normals);
-    this._shown.forEach((part, at) => (part.changed = turned || this.face.parts[at].changed));
   }
 }
 

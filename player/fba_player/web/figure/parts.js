@@ -5,14 +5,14 @@ import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.
 
 /**
  * A mesh of a figure, whose vertices are count from `first` on. positions, normals: three numbers each, in metres, which
- * move. changed: whether the last pose moved them. triangles: three vertices each, counted from 0, counter-clockwise from
+ * move. triangles: three vertices each, counted from 0, counter-clockwise from
  * outside. leaders: for each vertex the first that shares its normal. colour: linear light. gloss: 1 - roughness. colours: linear light, three numbers each, glosses: one each, or
  * null where all vertices have `colour` and `gloss`. texture: bytes of a picture in sRGB that multiplies the colours, or
  * null. texcoords: two numbers each, from the picture's top left. alpha: what texture's alpha and opacity mean, as in
  * `fba.mesh.Material`. across: of single hairs, eight numbers each; scatter, closed, smooth, opaque: as in `FaceShape` of the
  * desktop player, which says what shaders take. fine: strength and repetitions of the skin's relief. ball: whether it is an eyeball, which has a shader of its own.
  * @typedef {{
- *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array, changed: boolean,
+ *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array,
  *   triangles: Uint32Array, leaders: Uint32Array, colour: Float64Array, gloss: number, colours: Float32Array | null, glosses: Float32Array | null,
  *   texture: Uint8Array | null, texcoords: Float32Array | null, opacity: number, alpha: string, cutoff: number,
  *   twoSided: boolean, across: Float32Array | null, scatter: number, closed: boolean, smooth: boolean, opaque: boolean,
@@ -33,7 +33,7 @@ export function readParts(container, listed, positions, normals) {
     const count = checkedNumber(entry.count, `the vertices of ${what}`, positions.length / 3 - first + 1);
     const part = { ...surface(container, entry, count, what), ...mesh(container, entry, count, what) };
     const [start, stop] = [3 * first, 3 * (first + count)];
-    const moving = { first, positions: positions.subarray(start, stop), normals: normals.subarray(start, stop), changed: true };
+    const moving = { first, positions: positions.subarray(start, stop), normals: normals.subarray(start, stop) };
     first += count;
     return { ...part, ...moving };
   });

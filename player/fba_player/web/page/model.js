@@ -1,7 +1,7 @@
 /** The figures of a page: what a packed model is drawn as. */
 import { Figure } from "../figure/figure.js";
 import { Resolver } from "../figure/resolve.js";
-import { IDENTITY, multiply } from "./matrix.js";
+import { IDENTITY, multiply } from "../figure/matrices.js";
 
 /**
  * Figures to choose from: a head, a person or both. Of each its file, whether it has a body, the pictures of its parts by
@@ -30,7 +30,7 @@ const SHADOWS = {
 };
 
 /** Return what gzip packed. @param {Uint8Array} bytes */
-export async function unzipped(bytes) {
+async function unzipped(bytes) {
   const stream = new Blob([/** @type {BlobPart} */ (bytes)]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }

@@ -8,7 +8,7 @@ import faceVertex from "../../gl/shaders/face.vert";
 import lighting from "../../gl/shaders/lighting.glsl";
 import studioFragment from "../../gl/shaders/studio.frag";
 import studioVertex from "../../gl/shaders/studio.vert";
-import { IDENTITY, invert, rotationOf } from "./matrix.js";
+import { IDENTITY, invert, rotationOf } from "../figure/matrices.js";
 
 /**
  * A part of a figure: its triangles are indices `first` to `first + count` of the figure's; the rest as of `FaceShape` of
@@ -30,14 +30,14 @@ import { IDENTITY, invert, rotationOf } from "./matrix.js";
  * A figure in a pose. light: (V, 4), key light, sky, through the skin, rim light. world: where it stands. wrinkles:
  * strengths on the left and the right, four each, or null. limbs: those that keep light from it, as in face.vert, or null.
  * @typedef {{
- *   shape: Shape, positions: Float32Array, normals: Float32Array, light: Float32Array, world: import("./matrix.js").Matrix,
+ *   shape: Shape, positions: Float32Array, normals: Float32Array, light: Float32Array, world: import("../figure/matrices.js").Matrix,
  *   wrinkles: Float32Array | null, limbs: Float32Array | null,
  * }} Posed
  *
  * An eyeball. matrix: from its own frame, of radius 1 and looking along +z, into the world. iris, pupil: radii. lids: (4, 3).
  * axes: of the head, (3, 3), column after column.
  * @typedef {{
- *   matrix: import("./matrix.js").Matrix, iris: number, pupil: number, lids: Float32Array | number[], axes: number[],
+ *   matrix: import("../figure/matrices.js").Matrix, iris: number, pupil: number, lids: Float32Array | number[], axes: number[],
  * }} Eye
  *
  * @typedef {{
@@ -78,7 +78,7 @@ export class Renderer {
     this._square = arrayOf(gl, [-1, -1, 1, -1, -1, 1, 1, 1]);
     this._triangle = arrayOf(gl, [-1, -1, 3, -1, -1, 3]);
     this._eye = [0, 0, 0];
-    this._camera = /** @type {import("./matrix.js").Matrix} */ (IDENTITY);
+    this._camera = /** @type {import("../figure/matrices.js").Matrix} */ (IDENTITY);
     this._pixel = 1;
     this._program("studio", studioVertex, studioFragment);
     this._program("eye", eyeVertex, eyeFragment);
@@ -107,11 +107,15 @@ export class Renderer {
   }
 
   /** Free what belongs to figures that are no longer shown. @param {Shape[]} shown */
-  keep(shown) {
+  _keep(shown) {
     for (const [shape, buffers] of this._shapes) {
       if (shown.includes(shape)) continue;
       buffers.delete();
       this._shapes.delete(shape);
+      const { wrinkles } = shape;
+      if (!wrinkles) continue;
+      this._gl.deleteTexture(this._textures.get(wrinkles) ?? null);
+      this._textures.delete(wrinkles);
     }
   }
 
@@ -157,6 +161,7 @@ export class Renderer {
   /** @param {Posed[]} figures */
   _drawFigures(figures) {
     const gl = this._gl;
+    this._keep(figures.map(({ shape }) => shape));
     for (const figure of figures) this._buffers(figure.shape).write(figure);
     const all = figures.flatMap((figure) => figure.shape.parts.map((part) => /** @type {[Posed, Part]} */ ([figure, part])));
     for (const [figure, part] of all) if (!seeThrough(part)) this._drawPart(figure, part);
@@ -325,7 +330,7 @@ class Program {
     else gl.uniform4fv(uniform.place, values);
   }
 
-  /** @param {string} name @param {import("./matrix.js").Matrix} value 9 or 16 numbers */
+  /** @param {string} name @param {import("../figure/matrices.js").Matrix} value 9 or 16 numbers */
   matrix(name, value) {
     const [gl, uniform] = [this._gl, this._uniforms?.get(name)];
     if (!uniform) return;

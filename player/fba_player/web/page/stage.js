@@ -195,7 +195,7 @@ export class Stage {
   }
 }
 
-/** @param {import("./matrix.js").Matrix} matrix @param {number} aside */
+/** @param {import("../figure/matrices.js").Matrix} matrix @param {number} aside */
 function moved(matrix, aside) {
   const result = Float64Array.from(matrix);
   result[12] += aside;
