@@ -15,17 +15,16 @@ from fba.body.solve.conventions import convention
 from fba_player._figure.body_light import UNOBSTRUCTED_LIGHT
 from fba_player._figure.person import Person, head_middle
 from fba_player.web._container import Container, rounded
-from fba_player.web._face_packing import LIGHT_STEP, STEP, Chosen, fewer_triangles, reduce_parts
+from fba_player.web._face_packing import STEP, Chosen, reduce_parts
 
 WEIGHT_STEP = 1 / 16384
 """Weights and shares of twists are multiples of it."""
+FOLD_STEP = 1 / 255
 NORMAL_STEP = 1 / 63
 """Coordinates of normals are multiples of it: half a degree."""
 
 
-def pack_body_parts(
-    container: Container, person: Person, face_rows: Int64, detail: float
-) -> tuple[dict[str, Any], Int64]:
+def pack_body_parts(container: Container, person: Person, face_rows: Int64) -> tuple[dict[str, Any], Int64]:
     """Return the header of a person's body, and its vertices that stay, in their new order.
 
     face_rows: those of the face.
@@ -35,7 +34,7 @@ def pack_body_parts(
     for part in body.parts:
         shape = person.body_shapes.get(part.name)
         if shape is not None and len(shape.triangles):
-            chosen.append((part, fewer_triangles(shape, detail), body.starts[part.name], shape))
+            chosen.append((part, shape.triangles, body.starts[part.name], shape))
     reduced = reduce_parts(container, chosen)
     skull = skull_of(body)
     skeleton, default = body.skeleton, Skeleton.default()
@@ -96,11 +95,17 @@ def _kept(listed: Intp, rows: Int64) -> tuple[Int64, Int64]:
 
 
 def _pack_light(container: Container, person: Person, rows: Int64) -> dict[str, Any]:
-    """Return the light on a body, which its folds shade, as `FaceMesh.light`."""
-    folds = person.light.open_sky[rows].astype(np.float64)
-    key, sky, through, rim = UNOBSTRUCTED_LIGHT
-    lit = [np.full_like(folds, key), sky * folds, np.full_like(folds, through), rim * folds]
-    return {"shut": container.add_fractions(np.clip(np.stack(lit, axis=1), 0, 1), LIGHT_STEP)}
+    """Return the light on a body: what its folds leave of the sky, and the limbs that keep light from others.
+
+    light: that of a place without either, as `FaceMesh.light`. limbs: joints at both ends, and radius (m).
+    """
+    light = person.light
+    ends = zip(light.ends.tolist(), rounded(light.radii), strict=True)
+    return {
+        "light": UNOBSTRUCTED_LIGHT,
+        "open": container.add_fractions(light.open_sky[rows, None], FOLD_STEP),
+        "limbs": [[*joints, radius] for joints, radius in ends],
+    }
 
 
 def _pack_skeleton(skeleton: Skeleton) -> dict[str, Any]:

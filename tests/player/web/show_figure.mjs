@@ -1,7 +1,7 @@
 /**
  * Write what figures show: node show_figure.mjs REQUEST. A request names a figure's file and streams, each with frames and a
  * file for the results: for each frame 68 FAPs, the positions without the neck's bend of a head (of a person: the matrices of
- * its joints), then the positions and normals of all parts, as 64-bit numbers. Or it names a figure's file and holds faces:
+ * its joints), then the positions and normals of all parts, and the light on them, as 64-bit numbers. Or it names a figure's file and holds faces:
  * the result is the FAPs that are shown. Or it names damaged figures: the result is their messages, "" for those that can
  * be shown.
  */
@@ -40,7 +40,7 @@ function shown(figure, animation, frames) {
     timeline.at(time, faps, baps);
     figure.show(faps, figure.body ? baps : undefined);
     const parts = ["positions", "normals"].flatMap((what) => figure.parts.map((part) => part[what].slice()));
-    return [faps.slice(), figure.body ? figure.body.joints.slice() : rigid(figure.face), ...parts];
+    return [faps.slice(), figure.body ? figure.body.joints.slice() : rigid(figure.face), ...parts, ...figure.meshes.map(({ light }) => light.slice())];
   });
 }
 

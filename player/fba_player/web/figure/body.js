@@ -98,7 +98,8 @@ export class Body {
       return { shading, positions: part.positions, surface };
     });
     /** What the normals as modelled are besides those of the triangles. */
-    this._besides = modelled.map((number, at) => number - this._surface[at]);
+    this._besides = modelled;
+    for (let at = 0; at < modelled.length; at += 1) this._besides[at] -= this._surface[at];
     this._skin = new Skin(container, header.skin, this._rest.length / 3, count, parents, this.inverse);
     /** What moves a head of its own. */
     this._ownHead = header.ownHead ? new OwnHead(container, header.ownHead, this._rest.length / 3) : null;

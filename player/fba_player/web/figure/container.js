@@ -60,12 +60,14 @@ export class Container {
     const { width, signed, rows, columns, bytes, coding } = this._entry(place, what);
     const values = new Int32Array(rows * columns); // one type for all: code that gets several is slow
     const spare = 32 - 8 * width;
-    if (coding === "rise" && columns !== 1) refuse(`has ${columns} columns in ${what}, expected 1`);
+    const rises = coding === "rise";
+    if (rises && columns !== 1) refuse(`has ${columns} columns in ${what}, expected 1`);
     for (let column = 0, at = 0, high = 0; column < columns; column += 1, at += width * rows) {
       for (let row = 0, to = column, value = 0; row < rows; row += 1, to += columns) {
         let code = bytes[at + row];
-        for (let plane = 1; plane < width; plane += 1) code |= bytes[at + plane * rows + row] << (8 * plane);
-        if (coding === "rise") {
+        if (width > 1) code |= bytes[at + rows + row] << 8;
+        if (width > 2) code |= (bytes[at + 2 * rows + row] << 16) | (bytes[at + 3 * rows + row] << 24);
+        if (rises) {
           value = high - code;
           if (code === 0) high += 1;
           if (value < 0 || value > high) refuse(`has a corner before the first in ${what}`);

@@ -31,13 +31,10 @@ export class Face {
     this.parts = readParts(container, header.parts, this.positions, this.normals);
     /** How the face fills in what is not sent; see `Resolver`. */
     this.rules = new Rules(header);
-    /** 1 for an adult's size. */
-    this.scale = checkedNumber(header.scale, "the scale of the face");
-    /** Positions of feature points by name. @type {Map<string, Float64Array>} */
-    this.points = new Map(Object.entries(header.points ?? {}).map(([name, place]) => [name, checkedNumbers(place, "a feature point", 3)]));
     /** Where the head turns about. */
     this.centre = checkedNumbers(header.centre, "the centre of the head", 3);
-    this._sway = container.fractions(header.sway, "the sway of the neck", count, 1);
+    /** How far each vertex turns with the head. */
+    this.sway = container.fractions(header.sway, "the sway of the neck", count, 1);
     this._rows = container.indices(header.rows, "the rows of the motion", count, undefined, 1);
     this._shapes = container.integers(header.shapes?.array, "the shapes of the motion");
     this._step = checkedNumber(header.shapes.step, "the step of the motion");
@@ -62,14 +59,12 @@ export class Face {
     this.partMatrices = this.parts.map(() => Float64Array.from(IDENTITY));
     /** Turn of the head, 16 numbers, column by column. */
     this.headMatrix = Float64Array.from(IDENTITY);
-    this._before = Float64Array.from(IDENTITY);
     this._bent = Float64Array.from(IDENTITY);
     this._combined = Float64Array.from(IDENTITY);
   }
 
   /**
-   * Move the face: positions, normals, partMatrices and headMatrix, and `changed` of its parts. faps: 68 numbers, as a
-   * `Resolver` gives them.
+   * Move the face: positions, normals, partMatrices and headMatrix. faps: 68 numbers, as a `Resolver` gives them.
    * @param {ArrayLike<number>} faps
    */
   pose(faps) {
@@ -79,12 +74,9 @@ export class Face {
     this._touched.fill(0);
     for (const track of this._tracks) this._move(track);
     this.parts.forEach((part, at) => {
-      part.changed = this._touched[at] + this._was[at] > 0;
-      this._before.set(this.partMatrices[at]);
       if (this._touched[at]) this._shadings[at].update(part.positions, part.normals);
       else if (this._was[at]) part.normals.set(this._shadings[at].rest);
       composeTurns(this._transforms[at], this._faps, this.partMatrices[at]);
-      if (this._before.some((entry, place) => entry !== this.partMatrices[at][place])) part.changed = true;
     });
     this._was.set(this._touched);
     composeTurns(this._transforms[this.parts.length], this._faps, this.headMatrix);
@@ -129,8 +121,8 @@ export class Face {
       const { first, count } = this.parts[number];
       const stop = first + count;
       for (let start = first, next = first; start < stop; start = next) {
-        const share = bends ? this._sway[start] : 1;
-        while (next < stop && (!bends || this._sway[next] === share)) next += 1;
+        const share = bends ? this.sway[start] : 1;
+        while (next < stop && (!bends || this.sway[next] === share)) next += 1;
         if (share < 1) rotate(this._bent, x * share, y * share, z * share, this.centre);
         multiply(!withHead ? IDENTITY : share < 1 ? this._bent : this.headMatrix, this.partMatrices[number], this._combined);
         put(this._combined, this.positions, positions, 3 * start, 3 * next, 1);

@@ -5,6 +5,7 @@ import { MEMORY, checkedList, checkedNumber, checkedNumbers } from "./container.
 import { PER_DISTANCE, fapNumber, listOf, measure, pointsOf, turnsOf } from "./fba_face.js";
 import { Glb, inflated, refuse } from "./glb.js";
 import { ADULT_EYES, Tracks, addSeams, commonHeader, eyeHeader, findBall, partHeader } from "./glb_parts.js";
+import { bakeLight } from "./glb_light.js";
 import { shapedFace } from "./glb_shapes.js";
 import { IDENTITY } from "./matrices.js";
 
@@ -22,7 +23,7 @@ export async function readHead(bytes) {
   try {
     const glb = new Glb(bytes);
     const face = glb.root.extensions?.FBA_face ? await describedFace(glb, glb.root.extensions.FBA_face) : shapedFace(glb);
-    return { container: MEMORY, header: { version: 1, face } };
+    return { container: MEMORY, header: { version: 2, face } };
   } catch (error) {
     if (error instanceof FbaError) throw error;
     return refuse(`is damaged: ${error instanceof Error ? error.message : error}`);
@@ -76,6 +77,8 @@ async function describedFace(glb, content) {
     ...tracks.header(),
   };
   addSeams(header, pieces.map(({ primitive }) => primitive.normals));
+  const lips = ["2.2", "2.3"].map(bound);
+  header.light = bakeLight(header, Math.min(...lips) < 0 ? [] : lips, factor * units.ENS * PER_DISTANCE);
   return header;
 }
 

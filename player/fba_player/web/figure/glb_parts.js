@@ -14,9 +14,6 @@ export const ADULT_EYES = 0.062; // metres between them
 const MOST_SURFACES = 16; // that meet at one place
 const [SEAM_COSINE, SEAM_MOTION] = [0.7, 0.01];
 const [FEWEST, ROUNDNESS, FLAT] = [12, 0.03, 0.3]; // of an eyeball: vertices, error, depth by width
-const LIGHT = [1, 0.95, 0, 0.25]; // unobstructed: key, sky, through, rim
-const MOUTH_LIGHT = [0.3, 0.25, 0, 0.02];
-const IN_MOUTH = ["teeth", "tongue", "mouth"];
 /** @type {Record<string, number>} */
 const SCATTER = { skin: 1, tongue: 0.8, mouth: 0.8, teeth: 0.5, eye: 0.3 };
 const TWO_SIDED = ["brow", "lash", "hair", "other", "teeth", "tongue"];
@@ -134,7 +131,7 @@ export function commonHeader(pieces, eyes, apart, factor, chin, lobe, nose) {
   const middle = [0, 1, 2].map((axis) => (eyes[0][axis] + eyes[1][axis]) / 2);
   const count = pieces.reduce((sum, { header }) => sum + header.count, 0);
   if (!count || count > MOST_VERTICES) refuse(`has ${count} vertices, expected 1 to ${MOST_VERTICES}`);
-  const [positions, sway, shut] = [new Float32Array(3 * count), new Float32Array(count).fill(1), new Float32Array(4 * count)];
+  const [positions, sway] = [new Float32Array(3 * count), new Float32Array(count).fill(1)];
   const heads = pieces.filter(({ kind }) => kind === "skin");
   const top = Math.max(...(heads.length ? heads : pieces).map(({ primitive }) => boxOf(primitive.positions)[1][1]));
   const tall = 5.2 * nose;
@@ -145,7 +142,6 @@ export function commonHeader(pieces, eyes, apart, factor, chin, lobe, nose) {
     for (let k = 0; k < header.count; k += 1, at += 1) {
       const [, y, z] = primitive.positions.subarray(3 * k, 3 * k + 3);
       for (let axis = 0; axis < 3; axis += 1) positions[3 * at + axis] = factor * primitive.positions[3 * k + axis];
-      shut.set(IN_MOUTH.includes(kind) ? MOUTH_LIGHT : LIGHT, 4 * at);
       if (!chin || !lobe || !["skin", "hair", "other"].includes(kind)) continue;
       const reach = 2.3 * nose; // over which the neck bends
       const along = Math.min(Math.max((z - lobe[2]) / Math.max(chin[2] - lobe[2], 1e-6), 0), 1);
@@ -158,7 +154,7 @@ export function commonHeader(pieces, eyes, apart, factor, chin, lobe, nose) {
     halfHeight: 0.71 * height,
     halfWidth: 0.6 * height,
   };
-  return { parts: pieces.map(({ header }) => header), positions, sway, subject, scale: (factor * apart) / ADULT_EYES, light: { shut } };
+  return { parts: pieces.map(({ header }) => header), positions, sway, subject, scale: (factor * apart) / ADULT_EYES };
 }
 
 /** Return an eyeball for a header. @param {number} part @param {{centre: Point, radius: number}} ball @param {number} side @param {number} iris diameter @param {number} factor @param {number[]} lids */

@@ -3,6 +3,7 @@ import { DEFINITIONS } from "../loader/definitions.js";
 import { arkitNames } from "../loader/weights.js";
 import { checkedList, checkedNumber } from "./container.js";
 import { refuse } from "./glb.js";
+import { bakeLight } from "./glb_light.js";
 import { ADULT_EYES, Tracks, addSeams, commonHeader, eyeHeader, findBall, partHeader } from "./glb_parts.js";
 import { normalise } from "./parts.js";
 
@@ -100,8 +101,10 @@ export function shapedFace(glb) {
     const centre = Array.from(ball.centre, (place) => factor * place);
     if (!looks) transforms.push(...[[0, RADIAN, 0], [RADIAN, 0, 0]].map((amount, which) => ({ part: name, kind: "rotation", fap: EYE_FAPS[side][which], amount, centre })));
   }
+  /** @type {Record<string, any>} */
   const content = { ...header, centre: neck, points: {}, eyes: found, definitions: DEFINITIONS, fit: [], weights, transforms, ...tracks.header() };
   addSeams(content, shown.map(({ primitive }) => primitive.normals));
+  content.light = bakeLight(content, [], factor * size * NOSE);
   return content;
 }
 

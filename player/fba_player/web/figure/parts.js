@@ -5,18 +5,18 @@ import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.
 
 /**
  * A mesh of a figure, whose vertices are count from `first` on. positions, normals: three numbers each, in metres, which
- * move. changed: whether the last pose moved them. triangles: three vertices each, counted from 0, counter-clockwise from
+ * move. triangles: three vertices each, counted from 0, counter-clockwise from
  * outside. leaders: for each vertex the first that shares its normal. colour: linear light. gloss: 1 - roughness. colours: linear light, three numbers each, glosses: one each, or
  * null where all vertices have `colour` and `gloss`. texture: bytes of a picture in sRGB that multiplies the colours, or
  * null. texcoords: two numbers each, from the picture's top left. alpha: what texture's alpha and opacity mean, as in
  * `fba.mesh.Material`. across: of single hairs, eight numbers each; scatter, closed, smooth, opaque: as in `FaceShape` of the
- * desktop player, which says what shaders take. ball: whether it is an eyeball, which has a shader of its own.
+ * desktop player, which says what shaders take. fine: strength and repetitions of the skin's relief. ball: whether it is an eyeball, which has a shader of its own.
  * @typedef {{
- *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array, changed: boolean,
+ *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array,
  *   triangles: Uint32Array, leaders: Uint32Array, colour: Float64Array, gloss: number, colours: Float32Array | null, glosses: Float32Array | null,
  *   texture: Uint8Array | null, texcoords: Float32Array | null, opacity: number, alpha: string, cutoff: number,
  *   twoSided: boolean, across: Float32Array | null, scatter: number, closed: boolean, smooth: boolean, opaque: boolean,
- *   ball: boolean,
+ *   fine: number[], ball: boolean,
  * }} Part
  */
 
@@ -33,7 +33,7 @@ export function readParts(container, listed, positions, normals) {
     const count = checkedNumber(entry.count, `the vertices of ${what}`, positions.length / 3 - first + 1);
     const part = { ...surface(container, entry, count, what), ...mesh(container, entry, count, what) };
     const [start, stop] = [3 * first, 3 * (first + count)];
-    const moving = { first, positions: positions.subarray(start, stop), normals: normals.subarray(start, stop), changed: true };
+    const moving = { first, positions: positions.subarray(start, stop), normals: normals.subarray(start, stop) };
     first += count;
     return { ...part, ...moving };
   });
@@ -76,6 +76,7 @@ function surface(container, entry, count, what) {
     closed: entry.closed === true,
     smooth: entry.smooth === true,
     opaque: entry.opaque !== false,
+    fine: [...checkedNumbers(entry.fine ?? [0, 1], `the relief of ${what}`, 2)],
     ball: entry.ball === true,
   };
 }
@@ -88,20 +89,6 @@ function hairs(container, entry, count, what) {
     const [vertex, column] = [Math.floor(at / 8), at % 8];
     return column === 3 ? widths[vertex] : directions[7 * vertex + column - Number(column > 3)];
   });
-}
-
-/**
- * The light that reaches vertices, four shares each: key light, sky, through the skin, rim light. shut, wide: with the mouth
- * so, whose lips are the two vertices between which gaps (m) are measured; wide is null for what does not change.
- * @typedef {{shut: Float32Array, wide: Float32Array | null, lips: number[], gaps: number[]}} Light
- * @param {Container} container @param {Record<string, any>} header @param {number} count of vertices @returns {Light}
- */
-export function readLight(container, header, count) {
-  const shut = container.fractions(header.shut, "the light", count, 4);
-  if (header.wide === undefined) return { shut, wide: null, lips: [], gaps: [] };
-  const lips = checkedList(header.lips, "lips").map((lip) => checkedNumber(lip, "a vertex of the lips", count));
-  if (lips.length !== 2) refuse(`has ${lips.length} lips, expected 2`);
-  return { shut, wide: container.fractions(header.wide, "the light", count, 4), lips, gaps: [...checkedNumbers(header.gaps, "the gaps of the lips", 2)] };
 }
 
 /** Computes the normals of a part from its triangles, smooth across vertices at one place. */
