@@ -10,6 +10,7 @@ import subprocess
 import wave
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -150,7 +151,7 @@ def _posed(poses: list[dict[int, int]]) -> Animation:
         row[[fap - 1 for fap in pose]] = [*pose.values()]
     mask = np.ones(values.shape, dtype=bool)
     mask[:, :2] = False
-    return Animation(rate=25, index=np.arange(len(poses)), face=FaceTrack(values, mask))
+    return Animation(rate=Fraction(25), index=np.arange(len(poses)), face=FaceTrack(values, mask))
 
 
 def test_controls_by_mouse_and_keys(browse: Browse, head_page: str) -> None:
