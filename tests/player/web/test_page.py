@@ -127,10 +127,10 @@ def test_pictures_are_those_of_the_desktop_player(browse: Browse, what: str, tmp
     file.write_bytes(fba.encode(animation))
     steps: list[Step] = [{"wait": READY}, {"key": "h"}]
     for frame in frames:
-        moved = f"{PLAYER}.view = '{view}', {PLAYER}.frame = {frame}, "
-        moved += "new Promise((done) => setTimeout(done, 500))"
+        drawn = "(turn) => new Promise((done) => requestAnimationFrame(() => done(turn && next(turn - 1))))"
+        moved = f"{PLAYER}.frame = {frame}, (window.next = {drawn})(5)"
         steps += [{"run": moved}, {"shot": str(tmp_path / f"page{frame}.png")}]
-    assert browse(_exported(tmp_path, [file]), steps)["errors"] == []
+    assert browse(_exported(tmp_path, [file], "--view", view), steps)["errors"] == []
     for frame in frames:
         theirs = tmp_path / f"desktop{frame}.png"
         arguments = ["render", str(file), "-o", str(theirs), "--frame", str(frame)]
