@@ -10,6 +10,7 @@ import subprocess
 import wave
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -132,10 +133,10 @@ def test_pictures_are_those_of_the_desktop_player(browse: Browse, what: str, tmp
     file.write_bytes(fba.encode(animation))
     steps: list[Step] = [{"wait": READY}, {"key": "h"}]
     for frame in frames:
-        moved = f"{PLAYER}.view = '{view}', {PLAYER}.frame = {frame}, "
-        moved += "new Promise((done) => setTimeout(done, 500))"
+        drawn = "(turn) => new Promise((done) => requestAnimationFrame(() => done(turn && next(turn - 1))))"
+        moved = f"{PLAYER}.frame = {frame}, (window.next = {drawn})(5)"
         steps += [{"run": moved}, {"shot": str(tmp_path / f"page{frame}.png")}]
-    assert browse(_exported(tmp_path, [file]), steps)["errors"] == []
+    assert browse(_exported(tmp_path, [file], "--view", view), steps)["errors"] == []
     for frame in frames:
         theirs = tmp_path / f"desktop{frame}.png"
         arguments = ["render", str(file), "-o", str(theirs), "--frame", str(frame)]
@@ -156,7 +157,7 @@ def _posed(poses: list[dict[int, int]]) -> Animation:
         row[[fap - 1 for fap in pose]] = [*pose.values()]
     mask = np.ones(values.shape, dtype=bool)
     mask[:, :2] = False
-    return Animation(rate=25, index=np.arange(len(poses)), face=FaceTrack(values, mask))
+    return Animation(rate=Fraction(25), index=np.arange(len(poses)), face=FaceTrack(values, mask))
 
 
 def test_controls_by_mouse_and_keys(browse: Browse, head_page: str) -> None:
