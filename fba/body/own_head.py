@@ -54,7 +54,7 @@ class OwnHead:
     _last: list[tuple[bytes, Float64]] = field(default_factory=list, repr=False)
 
     @cached_property
-    def _matrix(self) -> tuple[Float64, Float64]:
+    def mixing(self) -> tuple[Float64, Float64]:
         """Scales (68,) of FAPs, and the matrix (68 + K, K) that mixes shapes."""
         faps = np.array([shape.faps for shape in self.shapes]).reshape(-1, FAP_COUNT).copy()
         for eye in self.eyes:  # the eyeballs turn, so shapes need not look aside
@@ -74,7 +74,7 @@ class OwnHead:
         key = values.tobytes()
         if self._last and self._last[0][0] == key:
             return self._last[0][1]
-        scales, matrix = self._matrix
+        scales, matrix = self.mixing
         count, reached = len(self.shapes), values * scales
         chosen = nnls(matrix, np.concatenate([reached, np.full(count, -FEW_WEIGHT / SMALL_WEIGHT)]))[0] > 0
         result: Float64 = np.zeros(count)

@@ -44,7 +44,7 @@ STIFFNESS = 1e-4
 
 
 @cache
-def _table() -> tuple[Intp, Intp, Float64]:
+def wrinkle_table() -> tuple[Intp, Intp, Float64]:
     """Return the rows of wrinkles.csv: their wrinkles (R,), columns of their FAPs, left and right (2, R), and
     the values that bring the wrinkles out fully (R,)."""
     rows = packaged_rows(__package__, "wrinkles.csv")
@@ -58,7 +58,7 @@ def wrinkle_strengths(faps: Float32) -> Float32:
 
     faps: (68,). A FAP counts only in the direction of its row; effects of several FAPs add up.
     """
-    kinds, columns, full = _table()
+    kinds, columns, full = wrinkle_table()
     shares = np.maximum(faps[columns] / full, 0.0)
     strengths = np.zeros((2, len(WRINKLES)))
     for side in range(2):

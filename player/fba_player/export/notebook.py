@@ -33,6 +33,8 @@ MAX_FILM_BYTES = 4 << 20
 """Size of a film above which the page gets a still picture instead."""
 PAGE_WIDTH, PAGE_HEIGHT = 800, 520
 """Size of the page of an animation, pixels."""
+BAR_HEIGHT = 86
+"""Height of the controls below the picture, pixels."""
 MAX_PAGE_BYTES = 8 << 20
 """Size of a page above which the notebook gets a film instead."""
 MIN_WIDTH = 16
@@ -152,7 +154,9 @@ def show_animations(shell: Any) -> None:
 def show_page(animation: Animation) -> str:
     """Return a frame with the page of `fba export` that plays an animation, as self-contained HTML.
 
-    What no stream can carry, and what would make a large page, becomes a `Preview` instead.
+    Below the frame lies a picture: it shows until the page does, and wherever frames are left out, as in
+    notebooks that are not trusted, and on GitHub. What no stream can carry, and what would make a large page,
+    becomes a `Preview` instead.
     """
     from fba_player.export.page import animation_page
 
@@ -165,12 +169,32 @@ def show_page(animation: Animation) -> str:
         return _figure(Preview(animation)._repr_html_(), f"A film only: {error}")
     if len(page) > MAX_PAGE_BYTES:
         return Preview(animation)._repr_html_()
+    try:
+        picture = _first_picture(animation)
+    except FbaError:
+        picture = ""  # without OpenGL: the page draws by itself
+    over = "position: absolute; inset: 0; width: 100%; height: 100%; border: 0"
     frame = (
         f'<iframe srcdoc="{html.escape(page, quote=True)}" title="{html.escape(caption, quote=True)}" '
-        f'style="width: 100%; max-width: {PAGE_WIDTH}px; height: {PAGE_HEIGHT}px; border: 0" '
-        'sandbox="allow-scripts allow-downloads" allow="fullscreen" loading="lazy"></iframe>'
+        f'style="{over}" sandbox="allow-scripts allow-downloads" allow="fullscreen" loading="lazy"></iframe>'
     )
-    return _figure(frame, caption)
+    place = f"position: relative; max-width: {PAGE_WIDTH}px; height: {PAGE_HEIGHT}px; overflow: hidden"
+    return _figure(f'<div style="{place}">{picture}{frame}</div>', caption)
+
+
+def _first_picture(animation: Animation) -> str:
+    """Return an image of the first frame where the page draws it."""
+    from fba_player.export._offscreen import Offscreen
+    from fba_player.export.image_files import put_picture
+    from fba_player.export.render import as_scene
+
+    scene, size = as_scene(animation), (PAGE_WIDTH, PAGE_HEIGHT - BAR_HEIGHT)
+    with Offscreen(scene, size) as view:
+        pixels = view.frame(float(scene.timeline.start))
+    file = io.BytesIO()
+    put_picture(file, pixels, ".jpg")
+    data = base64.b64encode(file.getvalue()).decode()
+    return f'<img alt="" style="width: 100%; display: block" src="data:image/jpeg;base64,{data}">'
 
 
 def describe(animation: Animation) -> str:

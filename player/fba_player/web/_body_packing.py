@@ -6,25 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Int64
+from fba.arrays import Int64, Intp
 from fba.body import SIDES, AttachedHead, BodyModel, Skeleton
 from fba.body.footing import SOLE, has_feet
 from fba.body.head_attachment import skull_of
+from fba.body.own_head import OwnHead
 from fba.body.solve.conventions import convention
 from fba_player._figure.body_light import UNOBSTRUCTED_LIGHT
 from fba_player._figure.person import Person, head_middle
 from fba_player.web._container import Container, rounded
-from fba_player.web._face_packing import LIGHT_STEP, STEP, Chosen, fewer_triangles, reduce_parts
+from fba_player.web._face_packing import STEP, Chosen, reduce_parts
 
 WEIGHT_STEP = 1 / 16384
 """Weights and shares of twists are multiples of it."""
+FOLD_STEP = 1 / 255
 NORMAL_STEP = 1 / 63
 """Coordinates of normals are multiples of it: half a degree."""
 
 
-def pack_body_parts(
-    container: Container, person: Person, face_rows: Int64, detail: float
-) -> tuple[dict[str, Any], Int64]:
+def pack_body_parts(container: Container, person: Person, face_rows: Int64) -> tuple[dict[str, Any], Int64]:
     """Return the header of a person's body, and its vertices that stay, in their new order.
 
     face_rows: those of the face.
@@ -34,7 +34,7 @@ def pack_body_parts(
     for part in body.parts:
         shape = person.body_shapes.get(part.name)
         if shape is not None and len(shape.triangles):
-            chosen.append((part, fewer_triangles(shape, detail), body.starts[part.name], shape))
+            chosen.append((part, shape.triangles, body.starts[part.name], shape))
     reduced = reduce_parts(container, chosen)
     skull = skull_of(body)
     skeleton, default = body.skeleton, Skeleton.default()
@@ -58,17 +58,54 @@ def pack_body_parts(
         "turn": turn,
         "place": place,
         "skin": _pack_skin(container, body, reduced.rows),
+        "ownHead": None if body.own_head is None else _pack_own_head(container, body.own_head, reduced.rows),
         "faceSkin": None if head is None else _pack_skin(container, head, face_rows),
     }
     return header, reduced.rows
 
 
+def _pack_own_head(container: Container, own: OwnHead, rows: Int64) -> dict[str, Any]:
+    """Return shapes and eyes of a body's own head. rows: (W,), vertices that stay, in their new order."""
+    scales, mixing = own.mixing
+    shapes = [_kept(shape.rows, rows) for shape in own.shapes]
+    eyes = [_kept(eye.rows, rows) for eye in own.eyes]
+    none, still = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    shifts = [shape.shifts[order] for shape, (_, order) in zip(own.shapes, shapes, strict=True)]
+    return {
+        "scales": rounded(scales, 12),
+        "faps": rounded(mixing[: len(scales)].T, 12),
+        "counts": [len(moved) for moved, _ in shapes],
+        "rows": container.add_integers(np.concatenate([none, *(moved for moved, _ in shapes)])),
+        "shifts": container.add_fractions(np.concatenate([still, *shifts]), STEP),
+        "eyes": [
+            {"side": SIDES.index(eye.side), "count": len(turned), "centre": rounded(eye.centre)}
+            for eye, (turned, _) in zip(own.eyes, eyes, strict=True)
+        ],
+        "turned": container.add_integers(np.concatenate([none, *(turned for turned, _ in eyes)])),
+    }
+
+
+def _kept(listed: Intp, rows: Int64) -> tuple[Int64, Int64]:
+    """Return the new numbers of those vertices that stay, ascending, and their places in the list."""
+    number = np.full(max(rows.max(initial=-1), listed.max(initial=-1)) + 1, -1)
+    number[rows] = np.arange(len(rows))
+    places = np.argsort(number[listed], kind="stable")
+    places = places[number[listed][places] >= 0]
+    return number[listed][places], places
+
+
 def _pack_light(container: Container, person: Person, rows: Int64) -> dict[str, Any]:
-    """Return the light on a body, which its folds shade, as `FaceMesh.light`."""
-    folds = person.light.open_sky[rows].astype(np.float64)
-    key, sky, through, rim = UNOBSTRUCTED_LIGHT
-    lit = [np.full_like(folds, key), sky * folds, np.full_like(folds, through), rim * folds]
-    return {"shut": container.add_fractions(np.clip(np.stack(lit, axis=1), 0, 1), LIGHT_STEP)}
+    """Return the light on a body: what its folds leave of the sky, and the limbs that keep light from others.
+
+    light: that of a place without either, as `FaceMesh.light`. limbs: joints at both ends, and radius (m).
+    """
+    light = person.light
+    ends = zip(light.ends.tolist(), rounded(light.radii), strict=True)
+    return {
+        "light": UNOBSTRUCTED_LIGHT,
+        "open": container.add_fractions(light.open_sky[rows, None], FOLD_STEP),
+        "limbs": [[*joints, radius] for joints, radius in ends],
+    }
 
 
 def _pack_skeleton(skeleton: Skeleton) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 "FBAW", the length of the header (uint32, little-endian as all numbers), the header: JSON in UTF-8, then the
 bytes of the arrays. `arrays` in the header lists them; other members name one by its place in that list. An
-array: [type, rows, columns, first byte after the header, coding]. Types: u1, i1, u2, i2, u4, i4. Codings,
+array: [type, rows, columns, first byte after the header, coding]. Types: u1, i1, u2, i2, i4. Codings,
 which make gzip's work easier, store the bytes of one column after the other: first the lowest bytes of all
 its rows, then the next. Coded are:
 
@@ -27,7 +27,7 @@ from fba.arrays import Array, Float64, Int64
 from fba.errors import ModelError
 
 MAGIC = b"FBAW"
-TYPES = ("u1", "i1", "u2", "i2", "u4", "i4")
+TYPES = ("u1", "i1", "u2", "i2", "i4")
 
 
 class Container:
@@ -58,7 +58,7 @@ class Container:
         flat = triangles.reshape(-1, 1)
         seen = np.maximum.accumulate(np.concatenate([[[-1]], flat]), axis=0)[:-1] + 1
         below = seen - flat
-        kind = "u2" if below.max(initial=0) < 1 << 16 else "u4"
+        kind = "u2" if below.max(initial=0) < 1 << 16 else "i4"
         return self._add(kind, below, int(kind[1]), "rise")
 
     def add_fractions(self, values: npt.ArrayLike, step: float, *, centred: bool = False) -> dict[str, Any]:

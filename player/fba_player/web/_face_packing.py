@@ -1,4 +1,4 @@
-"""Packs a face for the web player: fewer triangles, and the motion of each FAP as few shapes.
+"""Packs a face for the web player, with the motion of each FAP as few shapes.
 
 What a FAP does to N vertices at its K interval borders is a matrix (3 N, K). Most are products of one or two
 shapes (3 N,) with curves over the FAP's value, piecewise linear between the borders; so these are stored:
@@ -17,14 +17,14 @@ import numpy as np
 
 from fba.arrays import Float64, Int32, Int64, Integer
 from fba.body import BodyPart
-from fba.face import FaceDefMesh, FaceModel, InterpolationTable, Part, Term, feature_point_names
+from fba.face import FaceDefMesh, FaceModel, InterpolationTable, Part, Term
 from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
-from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, faps
+from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS, faps
 from fba_player._figure.face import FaceFigure
-from fba_player._figure.face_light import MOUTH_OPEN
 from fba_player._mesh.textures import load_picture
 from fba_player.view._view import FaceShape
 from fba_player.web._container import Container, rounded
+from fba_player.web._look_packing import pack_face_light, pack_wrinkles
 
 STEP = 1e-5
 """Metres: positions and shapes are multiples of it."""
@@ -39,7 +39,6 @@ TEXTURE_SIZE = 1024
 TEXTURE_QUALITY = 80
 COORDINATE_STEP = 1 / 8192
 SWAY_STEP = 1 / 8192
-LIGHT_STEP = 1 / 255
 HAIR_STEP = 1 / 127
 WIDTH_STEP = 1e-6
 """Metres: widths of hairs are multiples of it."""
@@ -47,7 +46,7 @@ WIDTH_STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """The parts of a figure with fewer vertices.
+    """The parts of a figure, with the vertices of their triangles.
 
     rows: int64 (W,), vertices of the model that stay, in their new order. header: what describes the parts.
     """
@@ -83,12 +82,6 @@ def reduce_parts(container: Container, parts: Iterable[Chosen], groups: Integer 
             entry["seams"] = container.add_integers(np.arange(len(chosen)) - leaders[shared])
         header.append(entry)
     return Reduced(np.concatenate(rows), header)
-
-
-def fewer_triangles(shape: FaceShape, error: float) -> Int32:
-    """Return the triangles of a shape (F, 3) with an error of the surface in metres; 0 for all."""
-    fewer = None if shape.coarser is None else shape.coarser.triangles_within(error)
-    return shape.triangles if fewer is None else fewer
 
 
 def order_triangles(triangles: Int32) -> Int64:
@@ -152,6 +145,7 @@ def _pack_shape(container: Container, shape: FaceShape | None, rows: Int64) -> d
         "closed": shape.closed,
         "smooth": shape.smooth,
         "opaque": shape.picture is None or shape.picture.opaque,
+        "fine": rounded(shape.fine),
     }
     if shape.across is not None:
         across = shape.across[rows].astype(np.float64)
@@ -193,16 +187,10 @@ def pack_face_parts(
         "positions": container.add_fractions(model.vertices[reduced.rows], STEP * size, centred=True),
         "sway": container.add_fractions(sways[reduced.rows][:, None], SWAY_STEP),
         "centre": figure.centre.tolist(),
-        "scale": rounded(size),
         "subject": {
             "centre": list(subject.centre),
             "halfHeight": subject.half_height,
             "halfWidth": subject.half_width,
-        },
-        "points": {
-            name: place.tolist()
-            for name, place in zip(feature_point_names(), model.points, strict=True)
-            if np.isfinite(place).all()
         },
         "eyes": [
             {
@@ -214,30 +202,12 @@ def pack_face_parts(
             for part, ball in figure.eyeballs
             if part.name in places
         ],
-        "light": _pack_light(container, figure, reduced.rows),
+        "light": pack_face_light(container, figure, reduced.rows),
+        "wrinkles": pack_wrinkles(container, figure, reduced.rows),
         **pack_rules(model),
         **_pack_motion(container, figure, reduced.rows),
     }
     return header, reduced.rows
-
-
-def _pack_light(container: Container, figure: FaceFigure, rows: Int64) -> dict[str, Any]:
-    """Return the light on an upright face, mouth shut and wide open: key, sky, through the skin, rim.
-
-    lips: the vertices between which `gaps` are measured (m); None for a face whose light does not change.
-    """
-    lit = []
-    for values in ({}, MOUTH_OPEN):
-        faps = np.zeros(FAP_COUNT, dtype=np.float32)
-        for fap, value in values.items():
-            faps[fap - 1] = value
-        shares = figure.light.shade(figure.pose(faps).positions, np.eye(3), np.eye(3))
-        lit.append(container.add_fractions(np.clip(shares[rows], 0, 1), LIGHT_STEP))
-    number = {int(row): place for place, row in enumerate(rows)}
-    lips = [number.get(row, -1) for row in figure.light.lips]
-    opens = len(lips) == 2 and min(lips) >= 0
-    gaps = rounded(figure.light.baked.gaps)
-    return {"shut": lit[0], "wide": lit[1], "lips": lips, "gaps": gaps} if opens else {"shut": lit[0]}
 
 
 def pack_rules(model: FaceModel) -> dict[str, Any]:

@@ -6,9 +6,12 @@
  *     renderer.setAnimationLoop((time) => { mixer.setTime(time / 1000); renderer.render(scene, camera); });
  */
 import { decode } from "./fba.js";
-import { ShapeWeights } from "./loader/weights.js";
+import { ShapeWeights, arkitNames } from "./loader/weights.js";
 import { Resolver, Rules } from "./figure/resolve.js";
+import { composeTurns } from "./figure/face.js";
+import { measure, pointsOf, turnsOf } from "./figure/fba_face.js";
 import { DEFINITIONS } from "./loader/definitions.js";
+import { FAP_NAMES } from "./page/names.js";
 import { Timeline, framesOf } from "./page/timeline.js";
 
 /** Radians in a unit of a FAP that is an angle. */
@@ -54,39 +57,51 @@ export class FBALoader {
  * @typedef {{
  *   traverse(visit: (object: any) => void): void, getObjectByName?(name: string): any,
  * }} Object3D
+ *
+ * What GLTFLoader returns. @typedef {{scene: Object3D, parser: {json: any, associations: Map<any, {nodes?: number}>}}} Gltf
  */
 
-/** Moves the morph targets of an object, and its head where it is told which object that is. */
+/**
+ * Moves the morph targets of a head. Give it what GLTFLoader returned, or an object of a scene: its heads with this project's
+ * FBA_face move as that says, others by shapes named as ARKit's.
+ */
 export class FBAMixer {
-  /** @param {Object3D} root @param {FBAClip} clip @param {{head?: any}} [options] head: an object of three.js that nods */
+  /** @param {Gltf | Object3D} root @param {FBAClip} clip @param {{head?: any}} [options] head: an object of three.js that nods, if the file does not say */
   constructor(root, clip, { head = null } = {}) {
     this.clip = clip;
     this.loop = true;
-    /** @type {{influences: number[], places: number[]}[]} */
-    this._targets = [];
-    /** @type {Set<string>} */
-    const names = new Set();
-    /** @type {any[]} */
-    const meshes = [];
-    root.traverse((object) => {
-      if (!object.morphTargetDictionary || !object.morphTargetInfluences) return;
-      meshes.push(object);
-      for (const name of Object.keys(object.morphTargetDictionary)) names.add(bare(name));
-    });
-    this._weights = new ShapeWeights([...names]);
-    if (!this._weights.names.length) throw new Error("the object has no morph targets named as ARKit's shapes, such as jawOpen");
-    for (const { morphTargetDictionary, morphTargetInfluences } of meshes) {
-      const place = Object.fromEntries(Object.entries(morphTargetDictionary).map(([name, at]) => [bare(name), at]));
-      this._targets.push({ influences: morphTargetInfluences, places: this._weights.names.map((name) => place[name] ?? -1) });
-    }
-    this._head = head;
-    this._rest = head?.quaternion.clone();
+    const gltf = "scene" in root ? root : null;
+    const described = gltf?.parser.json.extensions?.FBA_face;
+    this._mover = described ? new DescribedHead(gltf, described) : new ShapedHead(gltf?.scene ?? /** @type {Object3D} */ (root), head);
   }
 
   /** Show a time. @param {number} seconds from the first frame */
   setTime(seconds) {
     const { duration } = this.clip;
-    const faps = this.clip.faps(this.loop && duration > 0 ? seconds % duration : Math.min(seconds, duration));
+    this._mover.show(this.clip.faps(this.loop && duration > 0 ? seconds % duration : Math.min(seconds, duration)));
+  }
+}
+
+/** A head with shapes named as ARKit's, and perhaps an object that turns. */
+class ShapedHead {
+  /** @param {Object3D} root @param {any} head */
+  constructor(root, head) {
+    /** @type {any[]} */
+    const meshes = [];
+    root.traverse((object) => object.morphTargetDictionary && object.morphTargetInfluences && meshes.push(object));
+    const named = meshes.map(({ morphTargetDictionary }) => arkitNames(Object.keys(morphTargetDictionary)));
+    this._weights = new ShapeWeights([...new Set(named.flat().map(String))]);
+    if (!this._weights.names.length) throw new Error("the object has no morph targets named as ARKit's shapes, such as jawOpen, and no FBA_face");
+    this._targets = meshes.map(({ morphTargetDictionary, morphTargetInfluences }, k) => {
+      const places = Object.values(morphTargetDictionary);
+      return { influences: morphTargetInfluences, places: this._weights.names.map((name) => places[named[k].indexOf(name)] ?? -1) };
+    });
+    this._head = head;
+    this._rest = head?.quaternion.clone();
+  }
+
+  /** @param {Float32Array} faps */
+  show(faps) {
     const weights = this._weights.of(faps);
     for (const { influences, places } of this._targets) {
       places.forEach((place, k) => {
@@ -104,7 +119,39 @@ export class FBAMixer {
   }
 }
 
-/** Return the name of a shape without what programs put before it, as in "blendShape1.jawOpen". @param {string} name */
-function bare(name) {
-  return name.slice(name.lastIndexOf(".") + 1).replace(/_([LR])$/, (_, side) => (side === "L" ? "Left" : "Right"));
+/**
+ * A head with FBA_face: its morph targets are FAPs, each as it is at one value, so motion between is straight; parts that FAPs
+ * turn, such as eyeballs, turn, and so does the whole.
+ */
+class DescribedHead {
+  /** @param {Gltf} gltf @param {Record<string, any>} face */
+  constructor({ parser }, face) {
+    const { json, associations } = parser;
+    const units = measure(pointsOf(face));
+    const turns = turnsOf(face, units, 1);
+    const objectOf = new Map([...associations].flatMap(([object, { nodes }]) => (nodes === undefined || !object.isObject3D ? [] : [[nodes, object]])));
+    const parts = face.parts.map((/** @type {any} */ { node }) => objectOf.get(node));
+    const top = objectOf.get(json.nodes.findIndex((/** @type {any} */ { children = [] }) => children.includes(face.parts[0].node)));
+    /** Objects that turn, and by what. */
+    this._turned = [...parts, top].map((object, part) => ({ object, turns: turns.filter((turn) => (turn.part ?? parts.length) === part) })).filter(({ object, turns }) => object && turns.length);
+    this._targets = parts.flatMap((/** @type {any} */ object, /** @type {number} */ part) => {
+      if (!object?.morphTargetInfluences) return [];
+      const places = Object.entries(object.morphTargetDictionary).flatMap(([name, place]) => {
+        const column = FAP_NAMES.indexOf(name);
+        const moves = face.tables?.some((/** @type {any} */ { fap, meshes = [] }) => fap === name && meshes.some((/** @type {any} */ mesh) => mesh.part === part));
+        return moves && face.morphValues?.[name] ? [{ place, column, value: face.morphValues[name] }] : [];
+      });
+      return [{ influences: object.morphTargetInfluences, places }];
+    });
+    this._matrix = new Float64Array(16);
+  }
+
+  /** @param {Float32Array} faps */
+  show(faps) {
+    for (const { influences, places } of this._targets) for (const { place, column, value } of places) influences[place] = faps[column] / value;
+    for (const { object, turns } of this._turned) {
+      composeTurns(turns, faps, this._matrix);
+      object.matrix.fromArray(this._matrix).decompose(object.position, object.quaternion, object.scale);
+    }
+  }
 }

@@ -93,10 +93,30 @@ def test_a_clip_shows_itself_as_a_page_to_play(talking: Animation) -> None:
     assert page.text == "talking: 4 frames, 0:00.160 at 25 frames/s, face"
     framed = page.elements["iframe"]["srcdoc"] or ""
     assert framed == animation_page(talking[6:])
+    sandbox = (page.elements["iframe"]["sandbox"] or "").split()
+    assert "allow-same-origin" not in sandbox
+    assert "allow-top-navigation" not in sandbox
     content = re.search(r'id="fba-content">(.*?)</script>', framed)
     assert content is not None
     [source] = json.loads(content[1])["sources"]
     assert len(fba.decode(base64.b64decode(source["data"]))) == 4
+
+
+@pytest.mark.usefixtures("opengl")
+def test_where_frames_are_left_out_there_is_a_picture(talking: Animation) -> None:
+    pixels = np.asarray(Image.open(io.BytesIO(shown(talking).data("img", "image/jpeg"))))
+    assert pixels.shape == (notebook.PAGE_HEIGHT - notebook.BAR_HEIGHT, notebook.PAGE_WIDTH, 3)
+    assert pixels.std() > 10
+
+
+def test_without_opengl_there_is_the_page_alone(talking: Animation, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none() -> None:
+        raise DisplayError("no OpenGL")
+
+    monkeypatch.setattr(offscreen, "offscreen_context", none)
+    elements = shown(talking).elements
+    assert "iframe" in elements
+    assert "img" not in elements
 
 
 def test_what_no_stream_carries_shows_itself_as_a_film(talking: Animation) -> None:

@@ -1,21 +1,23 @@
 /**
  * Write what figures show: node show_figure.mjs REQUEST. A request names a figure's file and streams, each with frames and a
  * file for the results: for each frame 68 FAPs, the positions without the neck's bend of a head (of a person: the matrices of
- * its joints), then the positions and normals of all parts, as 64-bit numbers. Or it names a figure's file and holds faces:
+ * its joints), then the positions and normals of all parts, and the light on them, as 64-bit numbers. Or it names a figure's file and holds faces:
  * the result is the FAPs that are shown. Or it names damaged figures: the result is their messages, "" for those that can
  * be shown.
  */
 import { readFileSync, writeFileSync } from "node:fs";
 import { FbaError, decode } from "../../../player/fba_player/web/fba.js";
 import { Figure } from "../../../player/fba_player/web/figure/figure.js";
+import { isGlb } from "../../../player/fba_player/web/figure/glb.js";
+import { readHead } from "../../../player/fba_player/web/figure/glb_face.js";
 import { Resolver } from "../../../player/fba_player/web/figure/resolve.js";
 import { Timeline, framesOf } from "../../../player/fba_player/web/page/timeline.js";
 
 const request = JSON.parse(readFileSync(process.argv[2], "utf8"));
 if (request.damaged) {
-  writeFileSync(request.result, JSON.stringify(request.damaged.map(message)));
+  writeFileSync(request.result, JSON.stringify(await Promise.all(request.damaged.map(message))));
 } else {
-  const figure = new Figure(readFileSync(request.figure));
+  const figure = await read(request.figure);
   if (request.faces) {
     const resolver = new Resolver(figure.rules);
     const rows = request.faces.map((face) => {
@@ -38,7 +40,7 @@ function shown(figure, animation, frames) {
     timeline.at(time, faps, baps);
     figure.show(faps, figure.body ? baps : undefined);
     const parts = ["positions", "normals"].flatMap((what) => figure.parts.map((part) => part[what].slice()));
-    return [faps.slice(), figure.body ? figure.body.joints.slice() : rigid(figure.face), ...parts];
+    return [faps.slice(), figure.body ? figure.body.joints.slice() : rigid(figure.face), ...parts, ...figure.meshes.map(({ light }) => light.slice())];
   });
 }
 
@@ -59,9 +61,15 @@ function write(file, arrays) {
   writeFileSync(file, joined);
 }
 
-function message(file) {
+/** A packed figure, or a head as .glb. */
+async function read(file) {
+  const bytes = new Uint8Array(readFileSync(file));
+  return new Figure(isGlb(bytes) ? await readHead(bytes) : bytes);
+}
+
+async function message(file) {
   try {
-    const figure = new Figure(readFileSync(file));
+    const figure = await read(file);
     figure.show(new Float64Array(68).fill(100), new Float64Array(296).fill(1000));
     return "";
   } catch (error) {

@@ -1,6 +1,7 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
-// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds the skin's relief; SOLID ignores alpha, CUT makes holes where
+// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds the skin's relief; LIMBS (of the web
+// player) lets a body's limbs keep light from each other; SOLID ignores alpha, CUT makes holes where
 // it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
@@ -26,6 +27,9 @@ uniform vec4 wrinkles_right;
 out vec2 wrinkle_place;
 out vec4 wrinkles;
 #endif
+#ifdef LIMBS
+uniform vec4 limbs[24]; // both ends of each, and its radius
+#endif
 #ifdef HAIRS
 in vec4 in_across;      // of hairs: from the opposite vertex to this one, and half the width; else 0, 0, 0, 1
 in vec4 in_along;       // of hairs: direction to the tip, and which of the two sides this is
@@ -47,8 +51,36 @@ vec3 turned(vec3 at, vec3 axis, float sine, float cosine) {
     return at * cosine + cross(axis, at) * sine + axis * (dot(axis, at) * (1.0 - cosine));
 }
 
+#ifdef LIMBS
+// Shares of key light and sky that come past limbs, as in `fba_player._figure.body_light`.
+vec2 past_limbs(vec3 at, vec3 n) {
+    vec2 past = vec2(1.0);
+    for (int k = 0; k < 24; k += 2) {
+        vec3 away = limbs[k].xyz - at, axis = limbs[k + 1].xyz - limbs[k].xyz;
+        float radius = limbs[k].w, along = dot(axis, KEY_DIRECTION), squared = max(dot(axis, axis), 1e-9);
+        // The sky: a ball at the nearest point of the axis.
+        vec3 ball = away + axis * clamp(-dot(away, axis) / squared, 0.0, 1.0);
+        float per = 1.0 / max(dot(ball, ball), 1e-6), towards = dot(n, ball);
+        if (towards > 0.0) past.y *= 1.0 - min(min(radius * radius * per, 1.0) * 1.4 * towards * sqrt(per), 0.9);
+        // The key light: where the ray to it passes nearest to the axis.
+        float side = dot(away, KEY_DIRECTION);
+        float s = clamp((side * along - dot(away, axis)) / max(squared - along * along, 1e-9), 0.0, 1.0);
+        float ahead = side + s * along, soft = 0.12 * ahead + 0.012;
+        float hidden = smoothstep(-soft, soft, radius - length(away + s * axis - ahead * KEY_DIRECTION));
+        // A limb does not hide its own skin from the light.
+        float near = min((ahead / radius - 0.4) / 1.2, 1.0);
+        if (near > 0.0 && dot(n, KEY_DIRECTION) >= -0.2) past.x *= 1.0 - hidden * near;
+    }
+    return past;
+}
+#endif
+
 void main() {
     vec3 at = in_position;
+    vec4 reach = in_light;
+#ifdef LIMBS
+    reach.xyw *= past_limbs(at, in_normal).xyy;
+#endif
     vec3 out_ = in_normal;
     float cover = 1.0;
 #ifdef HAIRS
@@ -92,13 +124,13 @@ void main() {
 #else
     vec3 albedo = in_colour.rgb;
 #endif
-    shade.rgb = in_colour.rgb * diffuse(n, albedo, in_light, scatter);
-    shade.a = mirrored_key(view, n, in_light);
+    shade.rgb = in_colour.rgb * diffuse(n, albedo, reach, scatter);
+    shade.a = mirrored_key(view, n, reach);
     halfway.xyz = normalize(view + KEY_DIRECTION);
-    halfway.w = mirrored_around(view, n, in_colour.a, in_light);
+    halfway.w = mirrored_around(view, n, in_colour.a, reach);
 #else
     place = stands.xyz;
     colour = in_colour;
-    light = in_light;
+    light = reach;
 #endif
 }

@@ -1,10 +1,11 @@
 /** Poses a body by BAPs: what `fba.body.BapSolver` and `fba.body.footing` do, and its head as FAPs turn it. */
 import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.js";
+import { OwnHead } from "./own_head.js";
 import { IDENTITY, invertRigid, multiply } from "./matrices.js";
 import { Shading, normalise, readParts } from "./parts.js";
 import { Skin } from "./skin.js";
 
-/** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Arrays} Container */
 /** @typedef {{joint: number, place: Float64Array}} SolePoint a point of a sole, relative to the joint that moves it */
 
 const BAPS = 296;
@@ -97,8 +98,12 @@ export class Body {
       return { shading, positions: part.positions, surface };
     });
     /** What the normals as modelled are besides those of the triangles. */
-    this._besides = modelled.map((number, at) => number - this._surface[at]);
+    this._besides = modelled;
+    for (let at = 0; at < modelled.length; at += 1) this._besides[at] -= this._surface[at];
     this._skin = new Skin(container, header.skin, this._rest.length / 3, count, parents, this.inverse);
+    /** What moves a head of its own. */
+    this._ownHead = header.ownHead ? new OwnHead(container, header.ownHead, this._rest.length / 3) : null;
+    this._moved = this._ownHead ? this._rest.slice() : this._rest;
     this._ground = header.standard ? readGround(header, this._solver) : null;
     const skull = checkedNumber(header.skull, "the skull", count);
     this._skull = skull;
@@ -121,10 +126,21 @@ export class Body {
 
   /**
    * Move the body: joints, positions, normals, faceMatrix. baps: 296 numbers. headMatrix: turn of the head by FAPs, as
-   * `Face.headMatrix`.
-   * @param {ArrayLike<number>} baps @param {Float64Array} headMatrix
+   * `Face.headMatrix`. faps: 68, which move a head of its own.
+   * @param {ArrayLike<number>} baps @param {Float64Array} headMatrix @param {ArrayLike<number>} faps
    */
-  pose(baps, headMatrix) {
+  pose(baps, headMatrix, faps) {
+    const { joints } = this;
+    this.turn(baps, headMatrix);
+    this._ownHead?.move(this._rest, faps, this._moved);
+    this._skin.apply(joints, this._moved, this._besides, this.positions, this.normals);
+    for (const { shading, positions, surface } of this._shadings) shading.update(positions, surface);
+    for (let at = 0; at < this.normals.length; at += 1) this.normals[at] += this._surface[at];
+    normalise(this.normals, this.normals);
+  }
+
+  /** Move joints and faceMatrix alone. @param {ArrayLike<number>} baps @param {Float64Array} headMatrix */
+  turn(baps, headMatrix) {
     const { joints } = this;
     this._solver.pose(baps, joints);
     if (this._ground) {
@@ -134,10 +150,6 @@ export class Body {
       for (let at = 13; at < joints.length; at += 16) joints[at] += lift;
     }
     this._turnHead(headMatrix);
-    this._skin.apply(joints, this._rest, this._besides, this.positions, this.normals);
-    for (const { shading, positions, surface } of this._shadings) shading.update(positions, surface);
-    for (let at = 0; at < this.normals.length; at += 1) this.normals[at] += this._surface[at];
-    normalise(this.normals, this.normals);
   }
 
   /** @param {Float64Array} turn */

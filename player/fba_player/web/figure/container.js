@@ -5,23 +5,23 @@ import { FbaError } from "../decoder/errors.js";
  * [type, rows, columns, first byte, coding] of an array.
  * @typedef {[string, number, number, number, string]} Entry
  * @typedef {{array: number, step: number, origin: number[]}} Fractions
- * @typedef {Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Int32Array} Integers
+ * What gives arrays. @typedef {Pick<Container, "integers" | "fractions" | "indices" | "file">} Arrays
  */
 
-const TYPES = { u1: Uint8Array, i1: Int8Array, u2: Uint16Array, i2: Int16Array, u4: Uint32Array, i4: Int32Array };
+const TYPES = ["u1", "i1", "u2", "i2", "i4"]; // unsigned and signed integers of so many bytes
 const MAGIC = 0x57414246; // "FBAW"
 const START = 8;
-const MOST_NUMBERS = 64_000_000;
+export const MOST_NUMBERS = 64_000_000;
 
 /** @param {string} finding @returns {never} */
 export function refuse(finding) {
-  throw new FbaError("damage", `the model ${finding}`, undefined, undefined, "make the page again with fba export");
+  throw new FbaError("damage", `the model ${finding}`, undefined, undefined, "make it again with fba export");
 }
 
 /** Fail unless a number of a header is finite, and whole and below a limit where one is given. @param {unknown} value @param {string} what @param {number} [limit] @returns {number} */
 export function checkedNumber(value, what, limit) {
   const good = typeof value === "number" && Number.isFinite(value) && (limit === undefined || (Number.isInteger(value) && value >= 0 && value < limit));
-  return good ? value : refuse(`has ${JSON.stringify(value)} as ${what}${limit === undefined ? "" : `, expected 0 to ${limit - 1}`}`);
+  return good ? value : refuse(`has ${String(JSON.stringify(value)).slice(0, 60)} as ${what}${limit === undefined ? "" : `, expected 0 to ${limit - 1}`}`);
 }
 
 /** Return the column of a FAP. @param {unknown} fap its number, from 1 */
@@ -31,6 +31,7 @@ export function checkedFap(fap) {
 
 /** Return numbers of a header, as many as given. @param {unknown} values @param {string} what @param {number} [count] */
 export function checkedNumbers(values, what, count) {
+  if (values instanceof Float64Array) return values;
   if (!Array.isArray(values) || (count !== undefined && values.length !== count)) return refuse(`lacks the ${count ?? ""} numbers of ${what}`);
   return Float64Array.from(values, (value) => checkedNumber(value, what));
 }
@@ -54,25 +55,27 @@ export class Container {
     this._entries = checkedList(this.header.arrays, "arrays");
   }
 
-  /** Return an array of whole numbers, row by row, and its columns. @param {unknown} place @param {string} what @returns {{values: Integers, rows: number, columns: number}} */
+  /** Return an array of whole numbers, row by row, and its columns. @param {unknown} place @param {string} what */
   integers(place, what) {
-    const { type, rows, columns, bytes, coding } = this._entry(place, what);
-    const values = new TYPES[type](rows * columns);
-    const width = values.BYTES_PER_ELEMENT;
-    if (coding === "rise") checkRise(columns, what);
+    const { width, signed, rows, columns, bytes, coding } = this._entry(place, what);
+    const values = new Int32Array(rows * columns); // one type for all: code that gets several is slow
+    const spare = 32 - 8 * width;
+    const rises = coding === "rise";
+    if (rises && columns !== 1) refuse(`has ${columns} columns in ${what}, expected 1`);
     for (let column = 0, at = 0, high = 0; column < columns; column += 1, at += width * rows) {
-      for (let row = 0, value = 0; row < rows; row += 1) {
-        let code = 0;
-        for (let plane = width - 1; plane >= 0; plane -= 1) code = (code << 8) | bytes[at + plane * rows + row];
-        code >>>= 0;
-        if (coding === "rise") {
+      for (let row = 0, to = column, value = 0; row < rows; row += 1, to += columns) {
+        let code = bytes[at + row];
+        if (width > 1) code |= bytes[at + rows + row] << 8;
+        if (width > 2) code |= (bytes[at + 2 * rows + row] << 16) | (bytes[at + 3 * rows + row] << 24);
+        if (rises) {
           value = high - code;
           if (code === 0) high += 1;
-          if (value < 0) refuse(`has a corner before the first in ${what}`);
+          if (value < 0 || value > high) refuse(`has a corner before the first in ${what}`);
         } else {
-          value += code % 2 ? -(code + 1) / 2 : code / 2;
+          value = (value + ((code >>> 1) ^ -(code & 1))) << spare;
+          value = signed ? value >> spare : value >>> spare;
         }
-        values[row * columns + column] = value;
+        values[to] = value;
       }
     }
     return { values, rows, columns };
@@ -85,15 +88,20 @@ export class Container {
     const step = checkedNumber(reference.step, what);
     checkShape(found, what, rows, columns);
     const { values, columns: width } = found;
-    return new Float32Array(values.length).map((_, at) => values[at] * step + origin[at % width]);
+    const result = new Float32Array(values.length);
+    for (let column = 0; column < width; column += 1) {
+      for (let at = column; at < values.length; at += width) result[at] = values[at] * step + origin[column];
+    }
+    return result;
   }
 
   /** Return whole numbers, of which all are below a limit. @param {unknown} place @param {string} what @param {number} limit @param {number} [rows] @param {number} [columns] */
   indices(place, what, limit, rows, columns) {
     const found = this.integers(place, what);
     checkShape(found, what, rows, columns);
-    for (const value of found.values) if (value < 0 || value >= limit) refuse(`has ${value} in ${what}, expected 0 to ${limit - 1}`);
-    return found.values;
+    const { values } = found;
+    for (let at = 0; at < values.length; at += 1) if (values[at] < 0 || values[at] >= limit) refuse(`has ${values[at]} in ${what}, expected 0 to ${limit - 1}`);
+    return values;
   }
 
   /** Return the bytes of a file inside. @param {unknown} place @param {string} what */
@@ -105,16 +113,24 @@ export class Container {
   /** @param {unknown} place @param {string} what */
   _entry(place, what) {
     const entry = this._entries[checkedNumber(place, `the place of ${what}`, this._entries.length)];
-    if (!Array.isArray(entry) || !Object.hasOwn(TYPES, entry[0])) refuse(`has an unknown kind of array in ${what}`);
-    const type = /** @type {keyof typeof TYPES} */ (entry[0]);
+    if (!Array.isArray(entry) || !TYPES.includes(entry[0])) refuse(`has an unknown kind of array in ${what}`);
+    const [signed, width] = [entry[0][0] === "i", Number(entry[0][1])];
     const rows = checkedNumber(entry[1], `the rows of ${what}`, MOST_NUMBERS);
     const columns = checkedNumber(entry[2], `the columns of ${what}`, 65);
-    const size = rows * columns * TYPES[type].BYTES_PER_ELEMENT;
+    const size = rows * columns * width;
     const start = checkedNumber(entry[3], `the start of ${what}`, this._bytes.length + 1);
     if (start + size > this._bytes.length) refuse(`ends inside ${what}`);
-    return { type, rows, columns, bytes: this._bytes.subarray(start, start + size), coding: String(entry[4]) };
+    return { width, signed, rows, columns, bytes: this._bytes.subarray(start, start + size), coding: String(entry[4]) };
   }
 }
+
+/** The same access to arrays that are there already: whoever made the header put them in it. */
+export const MEMORY = /** @type {Arrays} */ ({
+  integers: (/** @type {any} */ place) => place,
+  fractions: (/** @type {any} */ reference) => reference,
+  indices: (/** @type {any} */ place) => place,
+  file: (/** @type {any} */ place) => place,
+});
 
 /** @param {Uint8Array} bytes */
 function parse(bytes) {
@@ -125,11 +141,6 @@ function parse(bytes) {
     // as if it held nothing
   }
   return refuse("has a header that is not JSON");
-}
-
-/** @param {number} columns @param {string} what */
-function checkRise(columns, what) {
-  if (columns !== 1) refuse(`has ${columns} columns in ${what}, expected 1`);
 }
 
 /** @param {{rows: number, columns: number}} found @param {string} what @param {number} [rows] @param {number} [columns] */

@@ -3,8 +3,9 @@ import { checkedFap, checkedList, checkedNumber, checkedNumbers, refuse } from "
 import { IDENTITY, multiply, rotate, setColumns, turnVector } from "./matrices.js";
 import { Shading, readParts } from "./parts.js";
 import { Rules } from "./resolve.js";
+import { ShapeWeights } from "../loader/weights.js";
 
-/** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Arrays} Container */
 
 /**
  * What a FAP does to some vertices of a part: shapes, the first at `shape`, times curves over its value; curve c has at border b
@@ -30,13 +31,10 @@ export class Face {
     this.parts = readParts(container, header.parts, this.positions, this.normals);
     /** How the face fills in what is not sent; see `Resolver`. */
     this.rules = new Rules(header);
-    /** 1 for an adult's size. */
-    this.scale = checkedNumber(header.scale, "the scale of the face");
-    /** Positions of feature points by name. @type {Map<string, Float64Array>} */
-    this.points = new Map(Object.entries(header.points ?? {}).map(([name, place]) => [name, checkedNumbers(place, "a feature point", 3)]));
     /** Where the head turns about. */
     this.centre = checkedNumbers(header.centre, "the centre of the head", 3);
-    this._sway = container.fractions(header.sway, "the sway of the neck", count, 1);
+    /** How far each vertex turns with the head. */
+    this.sway = container.fractions(header.sway, "the sway of the neck", count, 1);
     this._rows = container.indices(header.rows, "the rows of the motion", count, undefined, 1);
     this._shapes = container.integers(header.shapes?.array, "the shapes of the motion");
     this._step = checkedNumber(header.shapes.step, "the step of the motion");
@@ -51,43 +49,42 @@ export class Face {
       return shading;
     });
     this._faps = new Float64Array(FAPS);
+    /** What mixes the shapes of a head of another program, whose tracks are of shapes. */
+    this._mixer = header.weights ? new ShapeWeights(header.weights) : null;
+    /** Values of what moves vertices. @type {ArrayLike<number>} */
+    this._values = this._faps;
     this._touched = new Uint8Array(this.parts.length);
     this._was = new Uint8Array(this.parts.length);
     /** Turn of each part within the head, 16 numbers each, column by column. */
     this.partMatrices = this.parts.map(() => Float64Array.from(IDENTITY));
     /** Turn of the head, 16 numbers, column by column. */
     this.headMatrix = Float64Array.from(IDENTITY);
-    this._turn = Float64Array.from(IDENTITY);
-    this._before = Float64Array.from(IDENTITY);
     this._bent = Float64Array.from(IDENTITY);
     this._combined = Float64Array.from(IDENTITY);
   }
 
   /**
-   * Move the face: positions, normals, partMatrices and headMatrix, and `changed` of its parts. faps: 68 numbers, as a
-   * `Resolver` gives them.
+   * Move the face: positions, normals, partMatrices and headMatrix. faps: 68 numbers, as a `Resolver` gives them.
    * @param {ArrayLike<number>} faps
    */
   pose(faps) {
     this._faps.set(faps);
+    this._values = this._mixer?.of(faps) ?? this._faps;
     this.positions.set(this._rest);
     this._touched.fill(0);
     for (const track of this._tracks) this._move(track);
     this.parts.forEach((part, at) => {
-      part.changed = this._touched[at] + this._was[at] > 0;
-      this._before.set(this.partMatrices[at]);
       if (this._touched[at]) this._shadings[at].update(part.positions, part.normals);
       else if (this._was[at]) part.normals.set(this._shadings[at].rest);
-      this._compose(this._transforms[at], this.partMatrices[at]);
-      if (this._before.some((entry, place) => entry !== this.partMatrices[at][place])) part.changed = true;
+      composeTurns(this._transforms[at], this._faps, this.partMatrices[at]);
     });
     this._was.set(this._touched);
-    this._compose(this._transforms[this.parts.length], this.headMatrix);
+    composeTurns(this._transforms[this.parts.length], this._faps, this.headMatrix);
   }
 
   /** @param {Track} track */
   _move({ column, part, borders, curves, count, row, rows, shape }) {
-    const value = this._faps[column];
+    const value = this._values[column];
     if (value === 0) return;
     this._touched[part] = 1;
     const { positions, _rows: moved } = this;
@@ -99,31 +96,16 @@ export class Face {
     for (let curve = 0, from = 3 * shape; curve < count; curve += 1) {
       const low = curves[curve * size + border - 1];
       const weight = (low + (curves[curve * size + border] - low) * share) * this._step;
+      if (weight === 0) {
+        from += 3 * rows;
+        continue;
+      }
       for (let at = row; at < row + rows; at += 1, from += 3) {
         const to = 3 * moved[at];
         positions[to] += weight * values[from];
         positions[to + 1] += weight * values[from + 1];
         positions[to + 2] += weight * values[from + 2];
       }
-    }
-  }
-
-  /** Write the product of transforms, the outermost first. @param {Transform[]} transforms @param {Float64Array} result */
-  _compose(transforms, result) {
-    result.set(IDENTITY);
-    for (const { column, kind, amount, centre } of transforms) {
-      const value = this._faps[column];
-      if (value === 0) continue;
-      const [x, y, z] = [value * amount[0], value * amount[1], value * amount[2]];
-      const { _turn: turn } = this;
-      turn.set(IDENTITY);
-      if (kind === "translation") setColumns(turn, 12, x, y, z);
-      else if (kind === "rotation") rotate(turn, x, y, z, centre);
-      else {
-        [turn[0], turn[5], turn[10]] = [1 + x, 1 + y, 1 + z];
-        setColumns(turn, 12, -x * centre[0], -y * centre[1], -z * centre[2]);
-      }
-      multiply(result, turn, result);
     }
   }
 
@@ -139,14 +121,34 @@ export class Face {
       const { first, count } = this.parts[number];
       const stop = first + count;
       for (let start = first, next = first; start < stop; start = next) {
-        const share = bends ? this._sway[start] : 1;
-        while (next < stop && (!bends || this._sway[next] === share)) next += 1;
+        const share = bends ? this.sway[start] : 1;
+        while (next < stop && (!bends || this.sway[next] === share)) next += 1;
         if (share < 1) rotate(this._bent, x * share, y * share, z * share, this.centre);
         multiply(!withHead ? IDENTITY : share < 1 ? this._bent : this.headMatrix, this.partMatrices[number], this._combined);
         put(this._combined, this.positions, positions, 3 * start, 3 * next, 1);
         put(this._combined, this.normals, normals, 3 * start, 3 * next, 0);
       }
     }
+  }
+}
+
+const TURN = new Float64Array(16);
+
+/** Write the product of transforms, the outermost first. @param {Transform[]} transforms @param {ArrayLike<number>} faps @param {Float64Array} result */
+export function composeTurns(transforms, faps, result) {
+  result.set(IDENTITY);
+  for (const { column, kind, amount, centre } of transforms) {
+    const value = faps[column];
+    if (value === 0) continue;
+    const [x, y, z] = [value * amount[0], value * amount[1], value * amount[2]];
+    TURN.set(IDENTITY);
+    if (kind === "translation") setColumns(TURN, 12, x, y, z);
+    else if (kind === "rotation") rotate(TURN, x, y, z, centre);
+    else {
+      [TURN[0], TURN[5], TURN[10]] = [1 + x, 1 + y, 1 + z];
+      setColumns(TURN, 12, -x * centre[0], -y * centre[1], -z * centre[2]);
+    }
+    multiply(result, TURN, result);
   }
 }
 

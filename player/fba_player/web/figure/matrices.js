@@ -1,14 +1,17 @@
-/** Matrices of 16 numbers, column by column, as three.js has them. */
-
-/** @typedef {Float64Array | Float32Array} Matrix */
+/**
+ * Matrices of 16 numbers, column by column, as three.js and OpenGL have them.
+ * @typedef {Float64Array | Float32Array | number[]} Matrix
+ * @typedef {[number, number, number]} Vector
+ */
 
 export const IDENTITY = Float64Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
 
-/** Write outer . inner; the result may be one of them. Both move points, with 0 0 0 1 as the last row. @param {Float64Array} outer @param {Float64Array} inner @param {Float64Array} result */
-export function multiply(outer, inner, result) {
+/** Write and return outer . inner; the result may be one of them. @param {Matrix} outer @param {Matrix} inner @param {Float64Array} [result] */
+export function multiply(outer, inner, result = new Float64Array(16)) {
   const a = outer[0], b = outer[4], c = outer[8], d = outer[12]; // prettier-ignore
   const e = outer[1], f = outer[5], g = outer[9], h = outer[13]; // prettier-ignore
   const i = outer[2], j = outer[6], k = outer[10], l = outer[14]; // prettier-ignore
+  const m = outer[3], n = outer[7], o = outer[11], p = outer[15]; // prettier-ignore
   for (let column = 0; column < 16; column += 4) {
     const x = inner[column];
     const y = inner[column + 1];
@@ -17,8 +20,36 @@ export function multiply(outer, inner, result) {
     result[column] = a * x + b * y + c * z + d * w;
     result[column + 1] = e * x + f * y + g * z + h * w;
     result[column + 2] = i * x + j * y + k * z + l * w;
-    result[column + 3] = w;
+    result[column + 3] = m * x + n * y + o * z + p * w;
   }
+  return result;
+}
+
+/** Return the inverse, by Gauss-Jordan elimination. @param {Matrix} matrix */
+export function invert(matrix) {
+  const [from, to] = [Float64Array.from(matrix), Float64Array.from(IDENTITY)];
+  for (let column = 0; column < 4; column += 1) {
+    let pivot = column;
+    for (let row = column; row < 4; row += 1) {
+      if (Math.abs(from[4 * column + row]) > Math.abs(from[4 * column + pivot])) pivot = row;
+    }
+    for (const side of [from, to]) {
+      for (let k = 0; k < 4; k += 1) [side[4 * k + column], side[4 * k + pivot]] = [side[4 * k + pivot], side[4 * k + column]];
+    }
+    const scale = 1 / from[4 * column + column];
+    for (const side of [from, to]) for (let k = 0; k < 4; k += 1) side[4 * k + column] *= scale;
+    for (let row = 0; row < 4; row += 1) {
+      const factor = from[4 * column + row];
+      if (row === column || !factor) continue;
+      for (const side of [from, to]) for (let k = 0; k < 4; k += 1) side[4 * k + row] -= factor * side[4 * k + column];
+    }
+  }
+  return to;
+}
+
+/** Return the upper left (3, 3) of a matrix, column after column. @param {Matrix} matrix */
+export function rotationOf(matrix) {
+  return [0, 1, 2, 4, 5, 6, 8, 9, 10].map((k) => matrix[k]);
 }
 
 /** Write the inverse of a rotation and shift; the result may be the same. @param {Float64Array} matrix @param {Float64Array} result */

@@ -1,22 +1,22 @@
 /** The meshes of a figure: what they look like, and their normals as they move. */
 import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.js";
 
-/** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Arrays} Container */
 
 /**
  * A mesh of a figure, whose vertices are count from `first` on. positions, normals: three numbers each, in metres, which
- * move. changed: whether the last pose moved them. triangles: three vertices each, counted from 0, counter-clockwise from
+ * move. triangles: three vertices each, counted from 0, counter-clockwise from
  * outside. leaders: for each vertex the first that shares its normal. colour: linear light. gloss: 1 - roughness. colours: linear light, three numbers each, glosses: one each, or
  * null where all vertices have `colour` and `gloss`. texture: bytes of a picture in sRGB that multiplies the colours, or
  * null. texcoords: two numbers each, from the picture's top left. alpha: what texture's alpha and opacity mean, as in
  * `fba.mesh.Material`. across: of single hairs, eight numbers each; scatter, closed, smooth, opaque: as in `FaceShape` of the
- * desktop player, which says what shaders take. ball: whether it is an eyeball, which has a shader of its own.
+ * desktop player, which says what shaders take. fine: strength and repetitions of the skin's relief. ball: whether it is an eyeball, which has a shader of its own.
  * @typedef {{
- *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array, changed: boolean,
+ *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array,
  *   triangles: Uint32Array, leaders: Uint32Array, colour: Float64Array, gloss: number, colours: Float32Array | null, glosses: Float32Array | null,
  *   texture: Uint8Array | null, texcoords: Float32Array | null, opacity: number, alpha: string, cutoff: number,
  *   twoSided: boolean, across: Float32Array | null, scatter: number, closed: boolean, smooth: boolean, opaque: boolean,
- *   ball: boolean,
+ *   fine: number[], ball: boolean,
  * }} Part
  */
 
@@ -33,7 +33,7 @@ export function readParts(container, listed, positions, normals) {
     const count = checkedNumber(entry.count, `the vertices of ${what}`, positions.length / 3 - first + 1);
     const part = { ...surface(container, entry, count, what), ...mesh(container, entry, count, what) };
     const [start, stop] = [3 * first, 3 * (first + count)];
-    const moving = { first, positions: positions.subarray(start, stop), normals: normals.subarray(start, stop), changed: true };
+    const moving = { first, positions: positions.subarray(start, stop), normals: normals.subarray(start, stop) };
     first += count;
     return { ...part, ...moving };
   });
@@ -53,7 +53,7 @@ function mesh(container, entry, count, what) {
       leaders[at] -= before[at];
     }
   }
-  return { name: String(entry.name), kind: String(entry.kind), count, triangles: Uint32Array.from(corners), leaders };
+  return { name: String(entry.name), kind: String(entry.kind), count, triangles: new Uint32Array(corners), leaders };
 }
 
 /** @param {Container} container @param {Record<string, any>} entry @param {number} count @param {string} what */
@@ -76,6 +76,7 @@ function surface(container, entry, count, what) {
     closed: entry.closed === true,
     smooth: entry.smooth === true,
     opaque: entry.opaque !== false,
+    fine: [...checkedNumbers(entry.fine ?? [0, 1], `the relief of ${what}`, 2)],
     ball: entry.ball === true,
   };
 }
@@ -90,42 +91,40 @@ function hairs(container, entry, count, what) {
   });
 }
 
-/**
- * The light that reaches vertices, four shares each: key light, sky, through the skin, rim light. shut, wide: with the mouth
- * so, whose lips are the two vertices between which gaps (m) are measured; wide is null for what does not change.
- * @typedef {{shut: Float32Array, wide: Float32Array | null, lips: number[], gaps: number[]}} Light
- * @param {Container} container @param {Record<string, any>} header @param {number} count of vertices @returns {Light}
- */
-export function readLight(container, header, count) {
-  const shut = container.fractions(header.shut, "the light", count, 4);
-  if (header.wide === undefined) return { shut, wide: null, lips: [], gaps: [] };
-  const lips = checkedList(header.lips, "lips").map((lip) => checkedNumber(lip, "a vertex of the lips", count));
-  if (lips.length !== 2) refuse(`has ${lips.length} lips, expected 2`);
-  return { shut, wide: container.fractions(header.wide, "the light", count, 4), lips, gaps: [...checkedNumbers(header.gaps, "the gaps of the lips", 2)] };
-}
-
 /** Computes the normals of a part from its triangles, smooth across vertices at one place. */
 export class Shading {
   /** @param {Part} part whose positions are neutral @param {Uint8Array} moving which of its vertices may move by themselves */
   constructor({ triangles, positions: rest, leaders }, moving) {
     const count = rest.length / 3;
     this._group = leaders;
-    const corners = triangles.map((corner) => this._group[corner]);
+    const corners = new Uint32Array(triangles.length);
+    for (let at = 0; at < triangles.length; at += 1) corners[at] = leaders[triangles[at]];
     const sums = new Float32Array(3 * count);
     sum(triangles, corners, rest, sums);
     normalise(sums, sums);
     /** Neutral normals. */
-    this.rest = sums.map((_, at) => sums[3 * this._group[Math.floor(at / 3)] + (at % 3)]);
+    this.rest = new Float32Array(3 * count);
+    for (let vertex = 0; vertex < count; vertex += 1) {
+      for (let axis = 0; axis < 3; axis += 1) this.rest[3 * vertex + axis] = sums[3 * leaders[vertex] + axis];
+    }
     const changing = new Uint8Array(count);
     for (let at = 0; at < triangles.length; at += 3) {
       if (moving[triangles[at]] || moving[triangles[at + 1]] || moving[triangles[at + 2]]) {
         for (let corner = at; corner < at + 3; corner += 1) changing[corners[corner]] = 1;
       }
     }
-    const used = (/** @type {number} */ at) => changing[corners[at]] || changing[corners[at + 1]] || changing[corners[at + 2]];
-    const chosen = new Uint32Array(triangles.length / 3).map((_, at) => 3 * at).filter(used);
-    this._triangles = expandTriangles(triangles, chosen);
-    this._corners = expandTriangles(corners, chosen);
+    let used = 0;
+    this._triangles = new Uint32Array(triangles.length);
+    this._corners = new Uint32Array(triangles.length);
+    for (let at = 0; at < triangles.length; at += 3) {
+      if (!changing[corners[at]] && !changing[corners[at + 1]] && !changing[corners[at + 2]]) continue;
+      for (let corner = at; corner < at + 3; corner += 1, used += 1) {
+        this._triangles[used] = triangles[corner];
+        this._corners[used] = corners[corner];
+      }
+    }
+    this._triangles = this._triangles.subarray(0, used);
+    this._corners = this._corners.subarray(0, used);
     this._vertices = leaders.map((_, at) => at).filter((at) => changing[leaders[at]]);
     this._sums = sums;
   }
@@ -152,11 +151,6 @@ export class Shading {
       normals[to + 2] = still ? rest[to + 2] : z * scale;
     }
   }
-}
-
-/** @param {Uint32Array} corners @param {Uint32Array} chosen first corners of triangles */
-function expandTriangles(corners, chosen) {
-  return new Uint32Array(3 * chosen.length).map((_, at) => corners[chosen[Math.floor(at / 3)] + (at % 3)]);
 }
 
 /** Add the normal of each triangle, twice its area long, to its corners in sums. @param {Uint32Array} triangles @param {Uint32Array} corners @param {Float32Array} positions @param {Float32Array} sums */

@@ -2,7 +2,7 @@
 import { checkedList, checkedNumber, checkedNumbers } from "./container.js";
 import { multiply, quaternion } from "./matrices.js";
 
-/** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Arrays} Container */
 /** @typedef {{joint: number, child: number, count: number, centre: Float64Array, axis: Float64Array, childAxis: Float64Array}} Bone */
 /** @typedef {{joints: number[], centre: Float64Array, arm: Float64Array}} Girdle */
 
@@ -19,9 +19,9 @@ export class Skin {
     const lesser = container.fractions(header.weights, "weights of vertices", vertices, INFLUENCES - 1);
     /** Their weights, with a sum of 1. */
     this.weights = new Float32Array(INFLUENCES * vertices);
-    for (let at = 0; at < vertices; at += 1) {
-      const [a, b, c] = lesser.subarray(3 * at, 3 * at + 3);
-      this.weights.set([1 - a - b - c, a, b, c], INFLUENCES * at);
+    for (let at = 0, to = 0; at < lesser.length; at += 3, to += INFLUENCES) {
+      this.weights[to] = 1 - lesser[at] - lesser[at + 1] - lesser[at + 2];
+      for (let k = 0; k < 3; k += 1) this.weights[to + 1 + k] = lesser[at + k];
     }
     this._parents = parents;
     this._inverse = inverse;

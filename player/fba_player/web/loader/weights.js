@@ -1,9 +1,35 @@
 /** FAPs as weights of ARKit's 52 shapes: those whose FAPs come closest, as `fba.capture.blendshapes.to_blendshapes`. */
 import { CLOSED, JAW, METRES, SHAPES, SHARED_WEIGHT } from "./shapes.js";
 
+/** @type {Record<string, string>} */
+const SIDES = { l: "left", r: "right", lft: "left", rgt: "right" };
+const MOST_COMMON_WORDS = 4;
 const MOST_SWEEPS = 200;
 const SETTLED = 1e-4;
 const FAPS = METRES.length;
+
+/** ARKit's names by their words. @type {Map<string, string>} */
+const NAMES = new Map(Object.keys(SHAPES).map((name) => [wordsOf(name), name]));
+
+/**
+ * Return ARKit's names of morph targets, such as "blendShape1.eyeBlink_L", undefined for others. Where none is known, words that
+ * all names may begin with are left out.
+ * @param {unknown[]} names
+ */
+export function arkitNames(names) {
+  const texts = names.map((name) => String(name).slice(0, 200));
+  for (let without = 0; without < MOST_COMMON_WORDS; without += 1) {
+    const found = texts.map((text) => NAMES.get(wordsOf(text, without)) ?? NAMES.get(wordsOf(text.split(/[.:|/]/).pop() ?? "", without)));
+    if (found.some(Boolean)) return found;
+  }
+  return texts.map(() => undefined);
+}
+
+/** Return the words of a name in a fixed order, as programs put the side first or last. @param {string} name @param {number} [without] how many at its start */
+function wordsOf(name, without = 0) {
+  const words = (name.match(/[A-Z]+(?![a-z])|[A-Z]?[a-z]+/g) ?? []).slice(without);
+  return [...new Set(words.map((word) => SIDES[word.toLowerCase()] ?? word.toLowerCase()))].sort().join(" ");
+}
 
 /** Weights of shapes for one face after another. */
 export class ShapeWeights {

@@ -1,10 +1,10 @@
 /** The camera: an orbit about a target, with the named views of the desktop player. */
-import { multiply } from "./matrix.js";
+import { multiply } from "../figure/matrices.js";
 
 /**
  * The box that a camera is fitted to: its centre, and half its height, width and depth, metres.
  * @typedef {{centre: number[], halfHeight: number, halfWidth: number, halfDepth?: number}} Subject
- * @typedef {import("./matrix.js").Vector} Vector
+ * @typedef {import("../figure/matrices.js").Vector} Vector
  */
 
 /** Yaw (to the subject's left) and pitch (from above) of the named views, degrees. */

@@ -24,7 +24,7 @@ export const VIEW_NAMES = /** @type {[string, string][]} */ ([
 ]);
 
 /** Keys of the desktop player that work here, and what they do. */
-export const KEYS = /** @type {[string[], string][]} */ ([
+const KEYS = /** @type {[string[], string][]} */ ([
   [["Space"], "play, pause"],
   [["S"], "stop at the current time"],
   [["←", "→"], "one frame back, ahead"],
@@ -46,14 +46,14 @@ export const KEYS = /** @type {[string[], string][]} */ ([
   [["F1", "?"], "these keys"],
 ]);
 
-/** @param {keyof typeof ICONS} name */
-function icon(name) {
+/** Return the picture of a button. @param {keyof typeof ICONS} name */
+export function iconOf(name) {
   return `<svg viewBox="0 0 20 20" aria-hidden="true">${ICONS[name]}</svg>`;
 }
 
 /** @param {string} action @param {keyof typeof ICONS} picture @param {string} label @param {string} [more] */
 function button(action, picture, label, more = "") {
-  return `<button type="button" data-do="${action}" aria-label="${label}" title="${label}" ${more}>${icon(picture)}</button>`;
+  return `<button type="button" data-do="${action}" aria-label="${label}" title="${label}" ${more}>${iconOf(picture)}</button>`;
 }
 
 /** The inside of a player. */
@@ -92,11 +92,6 @@ export const TEMPLATE = `
     </div>
   </div>
 </div>`;
-
-/** Return the picture of a button. @param {keyof typeof ICONS} name */
-export function iconOf(name) {
-  return icon(name);
-}
 
 /** Return a time as minutes, seconds and hundredths. @param {number} seconds */
 export function clockText(seconds) {

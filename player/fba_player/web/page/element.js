@@ -19,6 +19,7 @@ import style from "./style.css";
 
 const TOAST = 1600; // milliseconds
 const CURVES = 3; // shown at first
+const AFTERWARDS = 50; // milliseconds after which panels are filled: the first picture comes before
 const LIVE_DELAY = 0.04; // seconds by which a live picture follows what has arrived, so that motion is smooth
 const LIVE_SLACK = 0.3; // seconds by which frames may come early or late before the clock is set anew
 
@@ -232,6 +233,7 @@ export class FBAPlayer extends HTMLElement {
     this._live?.stream.close();
     this._live = null;
     try {
+      this._makeStage(); // the graphics driver compiles while the model is unpacked
       const shown = await model;
       /** @type {(import("./stage.js").Performer & {timeline: Timeline})[]} */
       const performers = [];
@@ -248,8 +250,8 @@ export class FBAPlayer extends HTMLElement {
       if (loading !== this._loading) return;
       this.model = shown;
       this._setPerformers(performers, performers.map(({ timeline }) => timeline));
-      this.planes = sources.length === 1 ? planesOf(sources[0]) : null;
-      this._fill(sources);
+      this.planes = null;
+      setTimeout(() => loading === this._loading && this._fill(sources), AFTERWARDS);
       this._say(warnings.length ? `${warnings.length === 1 ? "The stream is damaged" : `${warnings.length} places are damaged`}; what is right is shown.\n${warnings.slice(0, 5).join("\n")}` : "", true);
       this._changed("loadedmetadata");
       this.dispatchEvent(new Event("loadeddata"));
@@ -387,13 +389,10 @@ export class FBAPlayer extends HTMLElement {
     this.pause();
     this._performers = performers;
     this._timelines = timelines;
-    if (!this._stage) {
-      this._stage = new Stage(this._canvas(".stage canvas"));
-      this._stage.onchange = () => this._request();
-    }
-    this._stage.resize();
-    this._stage.show(performers);
-    if (this.getAttribute("view")) this._stage.look(this.getAttribute("view") ?? "", false);
+    const stage = this._makeStage();
+    stage.resize();
+    stage.show(performers);
+    if (this.getAttribute("view")) stage.look(this.getAttribute("view") ?? "", false);
     this._find(".track").hidden = !timelines.length;
     if (timelines.length) {
       this.playback.time = -Infinity;
@@ -404,17 +403,28 @@ export class FBAPlayer extends HTMLElement {
     this._refresh();
   }
 
+  _makeStage() {
+    if (!this._stage) {
+      this._stage = new Stage(this._canvas(".stage canvas"));
+      this._stage.onchange = () => this._request();
+    }
+    return this._stage;
+  }
+
   /** Fill the panels. @param {Source[]} sources */
   _fill(sources) {
     const { frames } = this._timelines[0];
+    const planes = sources.map(planesOf);
+    this.planes = planes.length === 1 ? planes[0] : null;
     this._content = { visemes: visemesOf(frames), expressions: expressionsOf(frames), curves: [] };
     if (!this._find(".lanes").hidden) this._chooseCurves();
     const facts = this._find(".facts");
-    facts.replaceChildren(...sources.flatMap((source, k) => factsOf(source, this._timelines[k])));
+    facts.replaceChildren(...sources.flatMap((source, k) => factsOf(source, this._timelines[k], planes[k])));
     const list = this._find("#parameters");
     if (!list.children.length) {
       list.replaceChildren(...parameters().map(({ kind, number, name }) => Object.assign(document.createElement("option"), { value: `${kind} ${number} ${name}` })));
     }
+    this._request();
   }
 
   _chooseCurves() {

@@ -25,10 +25,9 @@ export function planesOf({ bytes, bapSteps }) {
   };
 }
 
-/** Return a heading and a list of facts. @param {import("./element.js").Source} source @param {import("./timeline.js").Timeline} timeline */
-export function factsOf(source, timeline) {
+/** Return a heading and a list of facts. @param {import("./element.js").Source} source @param {import("./timeline.js").Timeline} timeline @param {import("./lanes.js").Planes} planes */
+export function factsOf(source, timeline, planes) {
   const { frames } = timeline;
-  const planes = planesOf(source);
   const seconds = timeline.end - timeline.start;
   const intra = planes.intra.reduce((sum, one) => sum + one, 0);
   const parts = [frames.hasFace ? "face" : "", frames.hasBody ? "body" : ""].filter(Boolean).join(" and ");

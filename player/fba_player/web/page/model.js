@@ -1,22 +1,26 @@
 /** The figures of a page: what a packed model is drawn as. */
 import { Figure } from "../figure/figure.js";
+import { isGlb } from "../figure/glb.js";
+import { readHead } from "../figure/glb_face.js";
 import { Resolver } from "../figure/resolve.js";
-import { IDENTITY, multiply } from "./matrix.js";
+import { IDENTITY, multiply } from "../figure/matrices.js";
 
 /**
- * Figures to choose from: a head, a person or both. Of each its file, whether it has a body, and the pictures of its parts by
- * their place.
- * @typedef {{bytes: Uint8Array, hasBody: boolean, pictures: Map<number, ImageBitmap>}[]} Model
+ * Figures to choose from: a head, a person or both. Of each its file, whether it has a body, the pictures of its parts by
+ * their place, that of the skin's relief, and the figure for the first performance.
+ * @typedef {{pictures: Map<number, ImageBitmap>, relief: ImageBitmap | null}} Pictures
+ * @typedef {{source: Uint8Array | import("../figure/glb_face.js").Content, hasBody: boolean, pictures: Pictures, spare: Figure | null}[]} Model
  * @typedef {import("./renderer.js").Shape} Shape
  * @typedef {import("./camera.js").Subject} Subject
  * @typedef {import("./timeline.js").Timeline} Timeline
  */
 
-const MOUTH_CURVE = 0.4; // the first millimetres of an open mouth let in most of the light
 const SMALLEST_PUPIL = 0.03;
 const LARGEST_PUPIL = 0.92; // of the iris
 const OPEN_LIDS = [0, 0.5, 0.86, 0, -0.5, 0.86, 1, 0, 0.3, -1, 0, 0.3];
-const SAMPLES = 24; // moments at which the reach of a body is measured
+const MOST_LIMBS = 12; // as in face.vert
+const FAR = -1e4; // metres: the place of limbs that a body lacks, away from the light
+const SAMPLES = 48; // moments at which the reach of a body is measured
 const FARTHEST = 4; // metres that a person moves before the camera follows
 /** Joints with a shadow: radius (m), darkness, and height at rest (m). @type {Record<string, [number, number, number]>} */
 const SHADOWS = {
@@ -28,7 +32,7 @@ const SHADOWS = {
 };
 
 /** Return what gzip packed. @param {Uint8Array} bytes */
-export async function unzipped(bytes) {
+async function unzipped(bytes) {
   const stream = new Blob([/** @type {BlobPart} */ (bytes)]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
@@ -41,17 +45,21 @@ export function readModel(...files) {
 /** @param {Uint8Array} file */
 async function readFigure(file) {
   const bytes = file[0] === 0x1f && file[1] === 0x8b ? await unzipped(file) : file;
-  const figure = new Figure(bytes);
+  const source = isGlb(bytes) ? await readHead(bytes) : bytes;
+  const figure = new Figure(source);
   const pictures = new Map();
-  for (const [place, { texture, name }] of figure.parts.entries()) {
-    if (!texture) continue;
-    try {
-      pictures.set(place, await createImageBitmap(new Blob([/** @type {BlobPart} */ (texture)]), { premultiplyAlpha: "none", colorSpaceConversion: "none" }));
-    } catch {
-      throw new Error(`the model's picture of part "${name}" cannot be decoded`);
-    }
+  const decoded = figure.parts.map(async ({ texture, name }, place) => texture && pictures.set(place, await pictureOf(texture, `of part "${name}"`)));
+  const [relief] = await Promise.all([figure.relief && pictureOf(figure.relief, "of the skin"), ...decoded]);
+  return { source, hasBody: figure.body !== null, pictures: { pictures, relief }, spare: /** @type {Figure | null} */ (figure) };
+}
+
+/** @param {Uint8Array} bytes @param {string} what */
+async function pictureOf(bytes, what) {
+  try {
+    return await createImageBitmap(new Blob([/** @type {BlobPart} */ (bytes)]), { premultiplyAlpha: "none", colorSpaceConversion: "none" });
+  } catch {
+    throw new Error(`the model's picture ${what} cannot be decoded`);
   }
-  return { bytes, hasBody: figure.body !== null, pictures };
 }
 
 /**
@@ -64,31 +72,27 @@ export function makeFigure(model, hasBody, hasFace) {
   if (hasBody && !hasFace && !chosen.hasBody) {
     throw new Error("the stream moves a body, and this page has a head alone; make the page again with fba export");
   }
-  const figure = new Figure(chosen.bytes);
+  const figure = chosen.spare ?? new Figure(chosen.source);
+  chosen.spare = null;
   return { figure: new Drawn(figure, chosen.pictures), resolver: new Resolver(figure.rules) };
 }
 
 /** A figure as it is drawn: a `Figure` of the stage. */
 class Drawn {
-  /** @param {Figure} figure @param {Map<number, ImageBitmap>} pictures */
-  constructor(figure, pictures) {
+  /** @param {Figure} figure @param {Pictures} pictures */
+  constructor(figure, { pictures, relief }) {
     this._figure = figure;
     this.hasBody = figure.body !== null;
-    this._meshes = figure.meshes.map(({ parts, positions, normals, light }, mesh) => {
+    this._limbs = figure.limbs.length ? Float32Array.from({ length: 8 * MOST_LIMBS }, (_, k) => (k % 4 < 3 ? FAR : 1e-3)) : null;
+    this._meshes = figure.meshes.map(({ parts, positions, normals, light, wrinkles }, mesh) => {
       const before = mesh ? figure.meshes[0].parts.length : 0;
-      const lit = positions.length / 3;
-      return {
-        shape: shapeOf(parts, lit, (part) => pictures.get(before + part) ?? null),
-        positions,
-        normals,
-        light: light.shut.slice(),
-        source: light,
-        world: IDENTITY,
-        turn: [0, 0, 0],
-        centre: [0, 0, 0],
-        wrinkles: null,
-        share: 0,
+      const shape = {
+        ...shapeOf(parts, positions.length / 3, (part) => pictures.get(before + part) ?? null),
+        wrinkles,
+        relief: relief && { picture: relief, metres: figure.reliefSize },
       };
+      const strengths = wrinkles?.strengths ?? null;
+      return { shape, positions, normals, light, world: IDENTITY, wrinkles: strengths, limbs: wrinkles || mesh ? null : this._limbs };
     });
     this._feet = Object.entries(SHADOWS).flatMap(([name, shadow]) => {
       const joint = figure.body?.names.indexOf(name) ?? -1;
@@ -109,11 +113,12 @@ class Drawn {
   measure(timeline) {
     const [faps, baps] = [new Float32Array(68), new Float64Array(296)];
     const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+    const path = [];
     const count = this.hasBody ? Math.min(timeline.frames.length, SAMPLES) : 0;
     for (let k = 0; k < count; k += 1) {
-      timeline.at(timeline.timeOf(Math.round((k * (timeline.frames.length - 1)) / Math.max(count - 1, 1))), faps, baps);
-      this._figure.show(faps, baps);
-      const joints = this._figure.body?.joints ?? [];
+      timeline.at(timeline.timeOf(Math.floor((k * (timeline.frames.length - 1)) / Math.max(count - 1, 1))), faps, baps);
+      const joints = this._figure.turnJoints(baps);
+      path.push(this.root);
       for (let at = 12; at < joints.length; at += 16) {
         for (let axis = 0; axis < 3; axis += 1) {
           low[axis] = Math.min(low[axis], joints[at + axis]);
@@ -129,12 +134,22 @@ class Drawn {
       return;
     }
     this.follows = Math.max(...high.map((value, axis) => value - low[axis])) > FARTHEST;
-    const root = this.root;
-    const wide = this.follows ? 0.62 : Math.max(Math.hypot(high[0] - low[0], high[2] - low[2]) / 2 + 0.14, 0.62);
-    const top = this.follows ? root[1] + 0.89 : Math.max(high[1] + 0.24, 1);
-    const bottom = this.follows ? root[1] - 1.07 : Math.min(low[1] - 0.06, -0.07);
-    const [x, z] = this.follows ? [root[0], root[2]] : [(low[0] + high[0]) / 2, (low[2] + high[2]) / 2];
-    this.bodySubject = { centre: [x, (bottom + top) / 2, z], halfHeight: Math.max(((top - bottom) / 2) * 1.06, 0.9), halfWidth: wide };
+    if (this.follows) {
+      const [x, y, z] = this.root;
+      this.bodySubject = { centre: [x, y - 0.09, z], halfHeight: 0.98, halfWidth: 0.62 };
+      return;
+    }
+    const standing = [(low[0] + high[0]) / 2 - 0.35, -0.07, (low[2] + high[2]) / 2 - 0.3];
+    [0.1, 0.06, 0.1].forEach((room, axis) => (low[axis] = Math.min(low[axis] - room, standing[axis])));
+    [0.1, 0.14, 0.1].forEach((room, axis) => (high[axis] += room)); // the head is above its joint
+    const centre = low.map((value, axis) => (value + high[axis]) / 2);
+    const towards = Math.max(...path.map(([x, , z]) => Math.hypot(x - centre[0], z - centre[2])));
+    this.bodySubject = {
+      centre,
+      halfHeight: Math.max(((high[1] - low[1]) / 2) * 1.06, 0.9),
+      halfWidth: Math.max(Math.hypot(high[0] - low[0], high[2] - low[2]) / 2, 0.62),
+      halfDepth: Math.max(towards - 0.12, 0),
+    };
   }
 
   /** Where the root of the body is in the last pose. */
@@ -147,8 +162,10 @@ class Drawn {
   pose(faps, baps) {
     const figure = this._figure;
     figure.show(faps, baps);
-    for (const mesh of this._meshes) this._shade(mesh);
     const joints = figure.body?.joints;
+    figure.limbs.slice(0, MOST_LIMBS).forEach(([from, to, radius], limb) => {
+      [from, to].forEach((joint, end) => this._limbs?.set([...(joints?.subarray(16 * joint + 12, 16 * joint + 15) ?? []), radius], 8 * limb + 4 * end));
+    });
     return {
       figures: this._meshes,
       eyes: figure.eyes.map((eye) => this._eye(eye)),
@@ -156,21 +173,6 @@ class Drawn {
       ground: this.hasBody,
       background: null,
     };
-  }
-
-  /** Let light into an open mouth. @param {{source: import("../figure/figure.js").Light, light: Float32Array, share: number}} mesh */
-  _shade(mesh) {
-    const { source } = mesh;
-    const { wide } = source;
-    if (!wide) return;
-    const [upper, lower] = source.lips.map((lip) => 3 * lip);
-    const at = this._figure.face.positions;
-    const gap = Math.hypot(at[upper] - at[lower], at[upper + 1] - at[lower + 1], at[upper + 2] - at[lower + 2]);
-    const open = (gap - source.gaps[0]) / Math.max(source.gaps[1] - source.gaps[0], 1e-6);
-    const share = Math.round(Math.min(Math.max(open, 0), 1) ** MOUTH_CURVE * 100) / 100;
-    if (share === mesh.share) return;
-    mesh.share = share;
-    for (let k = 0; k < mesh.light.length; k += 1) mesh.light[k] = source.shut[k] + share * (wide[k] - source.shut[k]);
   }
 
   /** @param {import("../figure/figure.js").Eye} eye @returns {import("./renderer.js").Eye} */
@@ -216,28 +218,27 @@ function shadowOf([x, y, z], [radius, darkness, rest]) {
 /**
  * Return the shape of parts whose vertices follow each other.
  * @param {import("../figure/parts.js").Part[]} parts @param {number} count of vertices @param {(part: number) => ImageBitmap | null} pictureOf
- * @returns {Shape}
  */
 function shapeOf(parts, count, pictureOf) {
   const colours = new Float32Array(4 * count);
   const texcoords = parts.some((part) => part.texcoords) ? new Float32Array(2 * count) : null;
   const across = parts.some((part) => part.across) ? new Float32Array(8 * count) : null;
-  const triangles = [];
+  const triangles = new Uint32Array(parts.reduce((sum, part) => sum + (part.ball ? 0 : part.triangles.length), 0));
   const drawn = [];
+  let corners = 0;
   for (const [place, part] of parts.entries()) {
-    for (let k = 0; k < part.count; k += 1) {
-      const light = part.colours ? part.colours.subarray(3 * k, 3 * k + 3) : part.colour;
-      colours.set(light, 4 * (part.first + k));
-      colours[4 * (part.first + k) + 3] = part.glosses ? part.glosses[k] : part.gloss;
+    for (let k = 0, to = 4 * part.first; k < part.count; k += 1, to += 4) {
+      for (let channel = 0; channel < 3; channel += 1) colours[to + channel] = part.colours ? part.colours[3 * k + channel] : part.colour[channel];
+      colours[to + 3] = part.glosses ? part.glosses[k] : part.gloss;
     }
     if (part.texcoords) texcoords?.set(part.texcoords, 2 * part.first);
     if (part.across) across?.set(part.across, 8 * part.first);
-    const { scatter, closed, smooth, twoSided, opaque, alpha, opacity, cutoff, ball } = part;
+    const { kind, scatter, closed, smooth, twoSided, opaque, alpha, opacity, cutoff, fine, ball } = part;
     if (!ball) {
       const picture = part.texcoords ? pictureOf(place) : null;
-      drawn.push({ first: triangles.length, count: part.triangles.length, picture, opaque, scatter, twoSided, closed, hairs: part.across !== null, smooth, alpha, opacity, cutoff, wrinkled: false });
-      for (const corner of part.triangles) triangles.push(corner + part.first);
+      drawn.push({ first: corners, count: part.triangles.length, picture, opaque, scatter, twoSided, closed, hairs: part.across !== null, smooth, alpha, opacity, cutoff, fine, wrinkled: kind === "skin" });
+      for (let at = 0; at < part.triangles.length; at += 1, corners += 1) triangles[corners] = part.triangles[at] + part.first;
     }
   }
-  return { count, triangles: Uint32Array.from(triangles), parts: drawn, colours, sway: new Float32Array(count).fill(1), texcoords, across, wrinklePlaces: null };
+  return { count, triangles, parts: drawn, colours, texcoords, across };
 }

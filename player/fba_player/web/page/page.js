@@ -13,6 +13,8 @@ import { readModel } from "./model.js";
 
 /** @param {string} text base64 */
 function bytesOf(text) {
+  const { fromBase64 } = /** @type {{fromBase64?: (text: string) => Uint8Array}} */ (/** @type {unknown} */ (Uint8Array));
+  if (fromBase64) return fromBase64.call(Uint8Array, text); // browsers since 2025
   const letters = atob(text);
   const bytes = new Uint8Array(letters.length);
   for (let k = 0; k < letters.length; k += 1) bytes[k] = letters.charCodeAt(k);

@@ -8,7 +8,7 @@ import faceVertex from "../../gl/shaders/face.vert";
 import lighting from "../../gl/shaders/lighting.glsl";
 import studioFragment from "../../gl/shaders/studio.frag";
 import studioVertex from "../../gl/shaders/studio.vert";
-import { IDENTITY, invert, rotationOf } from "./matrix.js";
+import { IDENTITY, invert, rotationOf } from "../figure/matrices.js";
 
 /**
  * A part of a figure: its triangles are indices `first` to `first + count` of the figure's; the rest as of `FaceShape` of
@@ -16,26 +16,28 @@ import { IDENTITY, invert, rotationOf } from "./matrix.js";
  * @typedef {{
  *   first: number, count: number, picture: ImageBitmap | null, opaque: boolean, scatter: number, twoSided: boolean,
  *   closed: boolean, hairs: boolean, smooth: boolean, alpha: string, opacity: number, cutoff: number, wrinkled: boolean,
+ *   fine: number[],
  * }} Part
  *
- * What does not change of a figure of V vertices. colours: linear light and gloss, (V, 4). sway: how far a vertex turns with
- * the head. across: of hairs, (V, 8). wrinklePlaces: (V, 2).
+ * What does not change of a figure of V vertices. colours: linear light and gloss, (V, 4). across: of hairs, (V, 8).
+ * relief: that of the skin, and the metres after which it repeats.
  * @typedef {{
- *   count: number, triangles: Uint32Array, parts: Part[], colours: Float32Array, sway: Float32Array,
- *   texcoords: Float32Array | null, across: Float32Array | null, wrinklePlaces: Float32Array | null,
+ *   count: number, triangles: Uint32Array, parts: Part[], colours: Float32Array, texcoords: Float32Array | null,
+ *   across: Float32Array | null, wrinkles: import("../figure/wrinkles.js").Wrinkles | null,
+ *   relief: {picture: ImageBitmap, metres: number} | null,
  * }} Shape
  *
- * A figure in a pose. light: (V, 4), key light, sky, through the skin, rim light. world: where it stands. turn: axis of the
- * head's rotation about `centre`, times its angle. wrinkles: strengths on the left and the right, four each, or null.
+ * A figure in a pose. light: (V, 4), key light, sky, through the skin, rim light. world: where it stands. wrinkles:
+ * strengths on the left and the right, four each, or null. limbs: those that keep light from it, as in face.vert, or null.
  * @typedef {{
- *   shape: Shape, positions: Float32Array, normals: Float32Array, light: Float32Array, world: import("./matrix.js").Matrix,
- *   turn: number[], centre: number[], wrinkles: Float32Array | null,
+ *   shape: Shape, positions: Float32Array, normals: Float32Array, light: Float32Array, world: import("../figure/matrices.js").Matrix,
+ *   wrinkles: Float32Array | null, limbs: Float32Array | null,
  * }} Posed
  *
  * An eyeball. matrix: from its own frame, of radius 1 and looking along +z, into the world. iris, pupil: radii. lids: (4, 3).
  * axes: of the head, (3, 3), column after column.
  * @typedef {{
- *   matrix: import("./matrix.js").Matrix, iris: number, pupil: number, lids: Float32Array | number[], axes: number[],
+ *   matrix: import("../figure/matrices.js").Matrix, iris: number, pupil: number, lids: Float32Array | number[], axes: number[],
  * }} Eye
  *
  * @typedef {{
@@ -44,12 +46,18 @@ import { IDENTITY, invert, rotationOf } from "./matrix.js";
  */
 
 const ATTRIBUTES = [
-  "in_position", "in_normal", "in_light", "in_colour", "in_texture", "in_sway", "in_wrinkle", "in_across", "in_along",
+  "in_position", "in_normal", "in_light", "in_colour", "in_texture", "in_wrinkle", "in_across", "in_along",
 ];
 /** Pixels of blended parts with at least this opacity are drawn first, as opaque, then the others. */
 const CORE_OPACITY = 0.9;
 const TINT = [0.075, 0.105, 0.1];
 const EYE_STEPS = 32;
+const MIN_WRINKLE = 0.01; // strength from which wrinkles are drawn
+const MIN_RELIEF = 50; // pixels that the relief is wide where it is drawn
+const SAMPLED_VERTICES = 24; // of which the nearest says how near a figure is
+const UNITS = Object.entries({ picture: 0, relief: 1, wrinkle_map: 2 });
+/** Options of the programs that the built-in figures need: begun while the figure is still unpacked. */
+const USUAL = [["SMOOTH"], ["SMOOTH", "HAIRS"], ["SMOOTH", "TEXTURED"]];
 
 /** Draws views on a canvas. Throws an error where there is no WebGL 2. */
 export class Renderer {
@@ -64,14 +72,17 @@ export class Renderer {
     this._programs = new Map();
     /** @type {Map<Shape, Buffers>} */
     this._shapes = new Map();
-    /** @type {Map<ImageBitmap, WebGLTexture>} */
-    this._pictures = new Map();
+    /** @type {Map<object, WebGLTexture>} */
+    this._textures = new Map();
     this._sphere = sphereOf(gl);
     this._square = arrayOf(gl, [-1, -1, 1, -1, -1, 1, 1, 1]);
     this._triangle = arrayOf(gl, [-1, -1, 3, -1, -1, 3]);
     this._eye = [0, 0, 0];
-    this._camera = /** @type {import("./matrix.js").Matrix} */ (IDENTITY);
+    this._camera = /** @type {import("../figure/matrices.js").Matrix} */ (IDENTITY);
     this._pixel = 1;
+    this._program("studio", studioVertex, studioFragment);
+    this._program("eye", eyeVertex, eyeFragment);
+    for (const options of USUAL) this._program("face", faceVertex, faceFragment, options);
   }
 
   /** @param {View} view @param {import("./camera.js").Camera} camera */
@@ -96,11 +107,15 @@ export class Renderer {
   }
 
   /** Free what belongs to figures that are no longer shown. @param {Shape[]} shown */
-  keep(shown) {
+  _keep(shown) {
     for (const [shape, buffers] of this._shapes) {
       if (shown.includes(shape)) continue;
       buffers.delete();
       this._shapes.delete(shape);
+      const { wrinkles } = shape;
+      if (!wrinkles) continue;
+      this._gl.deleteTexture(this._textures.get(wrinkles) ?? null);
+      this._textures.delete(wrinkles);
     }
   }
 
@@ -146,6 +161,7 @@ export class Renderer {
   /** @param {Posed[]} figures */
   _drawFigures(figures) {
     const gl = this._gl;
+    this._keep(figures.map(({ shape }) => shape));
     for (const figure of figures) this._buffers(figure.shape).write(figure);
     const all = figures.flatMap((figure) => figure.shape.parts.map((part) => /** @type {[Posed, Part]} */ ([figure, part])));
     for (const [figure, part] of all) if (!seeThrough(part)) this._drawPart(figure, part);
@@ -161,23 +177,38 @@ export class Renderer {
   /** @param {Posed} figure @param {Part} part @param {boolean} [core] only pixels that are nearly opaque */
   _drawPart(figure, part, core = false) {
     const gl = this._gl;
+    const { shape, wrinkles, limbs } = figure;
+    const wrinkled = part.wrinkled && wrinkles !== null && Math.max(...wrinkles) >= MIN_WRINKLE;
+    const fine = part.fine[0] > 0 && shape.relief !== null && shape.relief.metres >= MIN_RELIEF * this._pixel * this._distance(figure);
     const options = Object.entries({
       SMOOTH: part.smooth,
       HAIRS: part.hairs,
+      LIMBS: limbs,
       TEXTURED: part.picture,
+      WRINKLED: wrinkled,
+      FINE: fine,
       SOLID: part.alpha === "opaque",
       CUT: part.alpha === "mask" || core,
       VEIL: part.alpha === "blend",
     }).flatMap(([name, used]) => (used ? [name] : []));
     const program = this._use("face", faceVertex, faceFragment, options);
     program.matrix("world", figure.world);
-    program.set("turn", figure.turn);
-    program.set("centre", figure.centre);
     program.set("scatter", part.scatter);
     program.set("two_sided", Number(part.twoSided));
     program.set("opacity", part.opacity);
     program.set("cut", core ? CORE_OPACITY : part.cutoff);
-    if (part.picture) gl.bindTexture(gl.TEXTURE_2D, this._picture(part.picture));
+    if (limbs) program.set("limbs", limbs);
+    if (part.picture) this._bind(0, part.picture, rootsOf);
+    if (fine && shape.relief) {
+      program.set("fine", part.fine);
+      this._bind(1, shape.relief.picture, (picture) => picture);
+    }
+    if (wrinkled && shape.wrinkles) {
+      program.set("wrinkles_left", wrinkles.subarray(0, 4));
+      program.set("wrinkles_right", wrinkles.subarray(4));
+      program.set("wrinkle_window", shape.wrinkles.window);
+      this._bind(2, shape.wrinkles, ({ map }) => map, gl.CLAMP_TO_EDGE);
+    }
     if (part.closed) gl.enable(gl.CULL_FACE);
     gl.bindVertexArray(this._buffers(figure.shape).array);
     gl.drawElements(gl.TRIANGLES, part.count, gl.UNSIGNED_INT, 4 * part.first);
@@ -191,22 +222,43 @@ export class Renderer {
     return buffers;
   }
 
-  /** @param {ImageBitmap} picture */
-  _picture(picture) {
-    let texture = this._pictures.get(picture);
-    if (!texture) this._pictures.set(picture, (texture = textureOf(this._gl, picture)));
-    return texture;
+  /** Return the distance from the eye to a figure. @param {Posed} figure */
+  _distance({ positions, world }) {
+    let least = Infinity;
+    const step = 3 * Math.max(Math.floor(positions.length / 3 / SAMPLED_VERTICES), 1);
+    for (let at = 0; at < positions.length; at += step) {
+      least = Math.min(least, Math.hypot(...this._eye.map((place, k) => positions[at + k] + world[12 + k] - place)));
+    }
+    return least;
+  }
+
+  /**
+   * Use a texture, made of pixels the first time.
+   * @template {object} Key @param {number} unit @param {Key} key @param {(key: Key) => Pixels} pixelsOf @param {number} [wrap]
+   */
+  _bind(unit, key, pixelsOf, wrap) {
+    const gl = this._gl;
+    let texture = this._textures.get(key);
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    if (!texture) this._textures.set(key, (texture = textureOf(gl, pixelsOf(key), wrap)));
+    gl.bindTexture(gl.TEXTURE_2D, texture);
   }
 
   /** Return a program in use, with its camera set. @param {string} name @param {string} vertex @param {string} fragment @param {string[]} options */
   _use(name, vertex, fragment, options = []) {
-    const key = [name, ...options].join(" ");
-    let program = this._programs.get(key);
-    if (!program) this._programs.set(key, (program = new Program(this._gl, vertex, fragment, options)));
-    this._gl.useProgram(program.program);
+    const program = this._program(name, vertex, fragment, options);
+    program.use();
     program.set("eye", this._eye);
     program.matrix("camera", this._camera);
     program.set("pixel", this._pixel);
+    return program;
+  }
+
+  /** Return a program, which the driver may still be compiling. @param {string} name @param {string} vertex @param {string} fragment @param {string[]} [options] */
+  _program(name, vertex, fragment, options = []) {
+    const key = [name, ...options].join(" ");
+    let program = this._programs.get(key);
+    if (!program) this._programs.set(key, (program = new Program(this._gl, vertex, fragment, options)));
     return program;
   }
 }
@@ -239,12 +291,21 @@ class Program {
     ATTRIBUTES.forEach((name, place) => gl.bindAttribLocation(this.program, place, name));
     gl.bindAttribLocation(this.program, 0, "in_corner");
     gl.linkProgram(this.program);
+    /** @type {Map<string, {place: WebGLUniformLocation, type: number}> | null} */
+    this._uniforms = null;
+  }
+
+  /** Use it from now on; the first time this waits until it is compiled. */
+  use() {
+    const gl = this._gl;
+    gl.useProgram(this.program);
+    if (this._uniforms) return;
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost()) {
       const logs = (gl.getAttachedShaders(this.program) ?? []).map((shader) => gl.getShaderInfoLog(shader));
       throw new Error(`the graphics driver refuses a shader: ${[gl.getProgramInfoLog(this.program), ...logs].join(" ")}`);
     }
-    /** @type {Map<string, {place: WebGLUniformLocation, type: number}>} */
     this._uniforms = new Map();
+    for (const [name, unit] of UNITS) gl.uniform1i(gl.getUniformLocation(this.program, name), unit);
     const count = gl.getProgramParameter(this.program, gl.ACTIVE_UNIFORMS);
     for (let k = 0; k < count; k += 1) {
       const { name, type } = /** @type {WebGLActiveInfo} */ (gl.getActiveUniform(this.program, k));
@@ -260,7 +321,7 @@ class Program {
 
   /** Set a uniform, if the program has it: a number or vectors. @param {string} name @param {number | ArrayLike<number>} value */
   set(name, value) {
-    const [gl, uniform] = [this._gl, this._uniforms.get(name)];
+    const [gl, uniform] = [this._gl, this._uniforms?.get(name)];
     if (!uniform) return;
     const values = typeof value === "number" ? [value] : Float32Array.from(value);
     if (uniform.type === gl.FLOAT) gl.uniform1fv(uniform.place, values);
@@ -269,9 +330,9 @@ class Program {
     else gl.uniform4fv(uniform.place, values);
   }
 
-  /** @param {string} name @param {import("./matrix.js").Matrix} value 9 or 16 numbers */
+  /** @param {string} name @param {import("../figure/matrices.js").Matrix} value 9 or 16 numbers */
   matrix(name, value) {
-    const [gl, uniform] = [this._gl, this._uniforms.get(name)];
+    const [gl, uniform] = [this._gl, this._uniforms?.get(name)];
     if (!uniform) return;
     const values = Float32Array.from(value);
     if (values.length === 9) gl.uniformMatrix3fv(uniform.place, false, values);
@@ -298,19 +359,16 @@ class Buffers {
     this._moving = [3, 3, 4].map((size, place) => this._attribute(place, size, 4 * size * count));
     this._attribute(3, 4, shape.colours);
     this._attribute(4, 2, shape.texcoords);
-    this._attribute(5, 1, shape.sway);
-    this._attribute(6, 2, shape.wrinklePlaces);
+    this._attribute(5, 2, shape.wrinkles?.places ?? null);
     if (shape.across) {
-      const buffer = this._attribute(7, 4, shape.across, 32);
+      const buffer = this._attribute(6, 4, shape.across, 32);
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      gl.enableVertexAttribArray(8);
-      gl.vertexAttribPointer(8, 4, gl.FLOAT, false, 32, 16);
+      gl.enableVertexAttribArray(7);
+      gl.vertexAttribPointer(7, 4, gl.FLOAT, false, 32, 16);
     }
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this._buffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, shape.triangles, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
-    /** @type {(Float32Array | null)[]} */
-    this._written = [null, null, null];
   }
 
   /** Write what moves. @param {Posed} figure */
@@ -350,23 +408,38 @@ class Buffers {
   }
 }
 
-/** Return the texture of a picture: square roots of linear light, as the shaders take it. @param {WebGL2RenderingContext} gl @param {ImageBitmap} picture */
-function textureOf(gl, picture) {
+/**
+ * A picture, or its numbers.
+ * @typedef {ImageBitmap | {width: number, height: number, data: Uint8Array}} Pixels
+ */
+
+/** @param {WebGL2RenderingContext} gl @param {Pixels} pixels @param {number} [wrap] */
+function textureOf(gl, pixels, wrap = gl.REPEAT) {
   const texture = /** @type {WebGLTexture} */ (gl.createTexture());
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  if ("data" in pixels) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, pixels.width, pixels.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels.data);
+  else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  gl.generateMipmap(gl.TEXTURE_2D);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, wrap);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, wrap);
+  return texture;
+}
+
+/** Return a picture as square roots of linear light, multiplied by alpha, as the shaders take it. @param {ImageBitmap} picture */
+function rootsOf(picture) {
   const canvas = new OffscreenCanvas(picture.width, picture.height);
-  const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
   context.drawImage(picture, 0, 0);
-  const pixels = context.getImageData(0, 0, picture.width, picture.height).data;
+  const pixels = new Uint8Array(context.getImageData(0, 0, picture.width, picture.height).data.buffer);
   const roots = Uint8Array.from({ length: 256 }, (_, value) => Math.round(255 * Math.sqrt(linear(value / 255))));
   for (let k = 0; k < pixels.length; k += 4) {
     const alpha = pixels[k + 3] / 255;
-    for (let channel = 0; channel < 3; channel += 1) pixels[k + channel] = roots[pixels[k + channel]] * alpha;
+    pixels[k] = roots[pixels[k]] * alpha;
+    pixels[k + 1] = roots[pixels[k + 1]] * alpha;
+    pixels[k + 2] = roots[pixels[k + 2]] * alpha;
   }
-  gl.bindTexture(gl.TEXTURE_2D, texture);
-  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, picture.width, picture.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
-  gl.generateMipmap(gl.TEXTURE_2D);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
-  return texture;
+  return { width: picture.width, height: picture.height, data: pixels };
 }
 
 /** Return linear light of a value in sRGB, both 0..1. @param {number} value */

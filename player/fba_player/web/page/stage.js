@@ -26,7 +26,6 @@ export class Stage {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    this._renderer = new Renderer(canvas);
     /** @type {Performer[]} */
     this.performers = [];
     this.camera = new Camera();
@@ -39,6 +38,8 @@ export class Stage {
     this._flight = null;
     this._faps = new Float32Array(68);
     this._baps = new Float64Array(296);
+    this.resize(); // before there are buffers that would have to grow
+    this._renderer = new Renderer(canvas);
     this._listen();
   }
 
@@ -194,7 +195,7 @@ export class Stage {
   }
 }
 
-/** @param {import("./matrix.js").Matrix} matrix @param {number} aside */
+/** @param {import("../figure/matrices.js").Matrix} matrix @param {number} aside */
 function moved(matrix, aside) {
   const result = Float64Array.from(matrix);
   result[12] += aside;
