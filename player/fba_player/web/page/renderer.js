@@ -162,7 +162,11 @@ export class Renderer {
   _drawFigures(figures) {
     const gl = this._gl;
     this._keep(figures.map(({ shape }) => shape));
-    for (const figure of figures) this._buffers(figure.shape).write(figure);
+    for (const figure of figures) {
+      const buffers = this._buffers(figure.shape);
+      buffers.write(figure);
+      if (buffers.written === 2) this._prepareWrinkles(figure.shape);
+    }
     const all = figures.flatMap((figure) => figure.shape.parts.map((part) => /** @type {[Posed, Part]} */ ([figure, part])));
     for (const [figure, part] of all) if (!seeThrough(part)) this._drawPart(figure, part);
     const transparent = all.filter(([, part]) => seeThrough(part));
@@ -174,23 +178,22 @@ export class Renderer {
     gl.disable(gl.BLEND);
   }
 
+  /** Make what wrinkles need, behind the first picture: it would make the first wrinkles late. @param {Shape} shape */
+  _prepareWrinkles(shape) {
+    if (!shape.wrinkles) return;
+    this._bind(2, shape.wrinkles, ({ map }) => map, this._gl.CLAMP_TO_EDGE);
+    for (const part of shape.parts.filter(({ wrinkled }) => wrinkled)) {
+      this._program("face", faceVertex, faceFragment, optionsOf(part, { wrinkled: true })).use();
+    }
+  }
+
   /** @param {Posed} figure @param {Part} part @param {boolean} [core] only pixels that are nearly opaque */
   _drawPart(figure, part, core = false) {
     const gl = this._gl;
     const { shape, wrinkles, limbs } = figure;
     const wrinkled = part.wrinkled && wrinkles !== null && Math.max(...wrinkles) >= MIN_WRINKLE;
     const fine = part.fine[0] > 0 && shape.relief !== null && shape.relief.metres >= MIN_RELIEF * this._pixel * this._distance(figure);
-    const options = Object.entries({
-      SMOOTH: part.smooth,
-      HAIRS: part.hairs,
-      LIMBS: limbs,
-      TEXTURED: part.picture,
-      WRINKLED: wrinkled,
-      FINE: fine,
-      SOLID: part.alpha === "opaque",
-      CUT: part.alpha === "mask" || core,
-      VEIL: part.alpha === "blend",
-    }).flatMap(([name, used]) => (used ? [name] : []));
+    const options = optionsOf(part, { limbs: limbs !== null, wrinkled, fine, core });
     const program = this._use("face", faceVertex, faceFragment, options);
     program.matrix("world", figure.world);
     program.set("scatter", part.scatter);
@@ -261,6 +264,21 @@ export class Renderer {
     if (!program) this._programs.set(key, (program = new Program(this._gl, vertex, fragment, options)));
     return program;
   }
+}
+
+/** Return the options of the program for a part. @param {Part} part @param {{limbs?: boolean, wrinkled?: boolean, fine?: boolean, core?: boolean}} state */
+function optionsOf(part, { limbs = false, wrinkled = false, fine = false, core = false }) {
+  return Object.entries({
+    SMOOTH: part.smooth,
+    HAIRS: part.hairs,
+    LIMBS: limbs,
+    TEXTURED: part.picture,
+    WRINKLED: wrinkled,
+    FINE: fine,
+    SOLID: part.alpha === "opaque",
+    CUT: part.alpha === "mask" || core,
+    VEIL: part.alpha === "blend",
+  }).flatMap(([name, used]) => (used ? [name] : []));
 }
 
 /** @param {Part} part */
@@ -369,11 +387,13 @@ class Buffers {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this._buffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, shape.triangles, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
+    this.written = 0;
   }
 
   /** Write what moves. @param {Posed} figure */
   write(figure) {
     const gl = this._gl;
+    this.written += 1;
     [figure.positions, figure.normals, figure.light].forEach((values, k) => {
       gl.bindBuffer(gl.ARRAY_BUFFER, this._moving[k]);
       gl.bufferSubData(gl.ARRAY_BUFFER, 0, values);
