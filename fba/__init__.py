@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from fba import body, capture, emotion, face
+    from fba import carriage as carriage
     from fba import codec as codec
     from fba import formats as formats
     from fba import live as live
@@ -59,8 +60,8 @@ _NAMES = {
 }  # fmt: skip
 """Public names by the module that they are imported from."""
 _MODULES = (
-    "body", "capture", "codec", "emotion", "face", "formats", "live", "parameters", "persona", "planning",
-    "player", "serving",
+    "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live", "parameters", "persona",
+    "planning", "player", "serving",
 )  # fmt: skip
 
 __all__ = [

@@ -129,7 +129,8 @@ def _read_offsets(box: Box, sizes: Int64, entry: int) -> Int64:
     firsts = np.cumsum(in_chunk) - in_chunk
     filled = in_chunk > 0
     origin = starts[filled] - before[firsts[filled]]
-    return before + np.repeat(origin, in_chunk[filled])
+    offsets: Int64 = before + np.repeat(origin, in_chunk[filled])
+    return offsets
 
 
 class Defaults(NamedTuple):

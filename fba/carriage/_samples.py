@@ -146,17 +146,18 @@ def _code_again(
     data: bytes, planes: StreamPlanes, bap_steps: BapTable | None, limits: Limits
 ) -> tuple[tuple[bytes, ...], bytes]:
     """Return the planes with start codes, and how to make the bytes of the stream again."""
-    table = planes.bap_steps
     coded = recode(planes, np.ones(len(planes.settings), dtype=np.bool_))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # whoever read the stream got them
-        before = decode(data, bap_steps=bap_steps, limits=limits)
-        same = before == decode(coded, bap_steps=table, limits=limits)
-    cut = _cut(coded, read_planes(coded, bap_steps=table, limits=limits))
+    again = read_planes(coded, bap_steps=planes.bap_steps, limits=limits)
+    cut = _cut(coded, again)
+    same = again.animation == planes.animation
+    if data.count(OBJECT_CODE) > 1:  # each may have its own table of BAP steps
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)  # whoever read the stream got them
+            same = same and again.animation == decode(data, bap_steps=bap_steps, limits=limits)
     if not same or cut is None:
         raise UnsupportedError(
-            "the objects of this stream do not fit into one track; `fba convert` makes one object of them: "
-            "convert it to .fba first",
+            "the objects of this stream do not fit into one track; make one object of them first: "
+            "fba convert IN.fba ONE.fba",
             what="several FBA objects in a track",
         )
     count = len(planes.settings)

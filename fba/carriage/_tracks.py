@@ -101,7 +101,7 @@ def _read_track(trak: Box, movie_scale: int) -> OpenTrack:
     number = head.read("I", 20 if head.version else 12)[0]
     times, kind = media.need(b"mdhd"), media.need(b"hdlr").read("4s", 8)[0]
     timescale, ticks = times.read("IQ", 20) if times.version else times.read("II", 12)
-    handler = bytes(kind)  # type: ignore[arg-type]
+    handler = bytes(kind)
     if not timescale:
         raise times.broken("its time scale is 0 ticks a second; it is damaged")
     table = media.need(b"minf", b"stbl")

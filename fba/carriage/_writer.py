@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fba.arrays import Bool, Int64
+from fba.arrays import Bool, Float64, Int64
 from fba.carriage._boxes import write_box, write_full_box
 from fba.carriage._descriptors import (
     AAC_OBJECT,
@@ -109,9 +109,9 @@ class _Track:
         """Length in the presentation."""
         return Fraction(max(int(self.durations.sum()) - self.skipped, 0), self.scale)
 
-    def presented(self) -> list[float]:
-        """Return when each sample is presented, in seconds."""
-        return ((self.times[:-1] - self.skipped) / self.scale + float(self.delay)).tolist()
+    def presented(self) -> Float64:
+        """Return when each sample is presented, float64 (T,), in seconds."""
+        return (self.times[:-1] - self.skipped) / self.scale + float(self.delay)
 
 
 def _fba_track(samples: PlaneSamples) -> _Track:
@@ -156,7 +156,7 @@ def _sound_track(sound: SoundTrack, offset: Fraction) -> _Track:
         kind, described = b"Opus", write_box(b"dOps", head, sound.configuration[19:] if family else b"")
     shown_rate = sound.rate << 16 if sound.rate < 1 << 16 else 0
     entry = write_box(kind, struct.pack(">6xH8xHHII", 1, sound.channels, 16, 0, shown_rate), described)
-    early = round(max(-offset, 0) * sound.rate)
+    early = round(max(-offset, Fraction(0)) * sound.rate)
     header = write_full_box(b"smhd", 0, 0, bytes(4))
     return _Track(
         2, b"soun", header, entry, sound.rate, sound.packets, sound.durations, None,
@@ -166,42 +166,37 @@ def _sound_track(sound: SoundTrack, offset: Fraction) -> _Track:
 
 def _whole_file(tracks: list[_Track]) -> bytes:
     """Return a file with all tables before the data, whose chunks alternate."""
-    chunks = sorted(
-        (track.presented()[first], track.number, first, stop)
-        for track in tracks
-        for first, stop in _chunks(track)
-    )
-    by_number = {track.number: track for track in tracks}
-    payload = [b"".join(by_number[number].samples[first:stop]) for _, number, first, stop in chunks]
+    chunks = sorted(chunk for track in tracks for chunk in _chunks(track))
+    samples = {track.number: track.samples for track in tracks}
+    payload = [b"".join(samples[number][first:stop]) for _, number, first, stop in chunks]
     lengths = np.array([len(piece) for piece in payload], dtype=np.int64)
     relative = np.cumsum(lengths) - lengths
+    owners = np.array([number for _, number, _, _ in chunks])
+    counts = np.array([stop - first for _, _, first, stop in chunks])
     begin = _file_type(b"isom", b"iso2", b"mp42")
     total = int(lengths.sum())
     wide = total + (1 << 24) >= 1 << 32
     header = 16 if total + 8 >= 1 << 32 else 8
     at = 0
     for _ in range(2):  # once for its length
-        moov = _moov(
-            tracks,
-            {
-                track.number: _tables(
-                    track,
-                    np.array([relative[n] for n, each in enumerate(chunks) if each[1] == track.number]) + at,
-                    np.array([stop - first for _, number, first, stop in chunks if number == track.number]),
-                    wide=wide,
-                )
-                for track in tracks
-            },
-        )
+        tables = {
+            track.number: _tables(
+                track, relative[owners == track.number] + at, counts[owners == track.number], wide=wide
+            )
+            for track in tracks
+        }
+        moov = _moov(tracks, tables)
         at = len(begin) + len(moov) + header
     return b"".join((begin, moov, write_box(b"mdat", *payload)))
 
 
-def _chunks(track: _Track) -> Iterator[tuple[int, int]]:
-    """Yield first sample and end of each chunk."""
+def _chunks(track: _Track) -> Iterator[tuple[float, int, int, int]]:
+    """Yield of each chunk when it is presented, the number of the track, the first sample and the end."""
     seconds = track.times[:-1] // (track.scale * CHUNK_SECONDS)
     borders = [0, *(np.flatnonzero(np.diff(seconds)) + 1).tolist(), len(track.samples)]
-    yield from pairwise(borders)
+    moments = track.presented()
+    for first, stop in pairwise(borders):
+        yield float(moments[first]), track.number, first, stop
 
 
 def _tables(track: _Track, offsets: Int64, counts: Int64, *, wide: bool) -> bytes:
@@ -264,11 +259,11 @@ def _fragmented_file(tracks: list[_Track], period: Fraction) -> bytes:
     return b"".join(parts)
 
 
-def _fragment_ends(planes: _Track, moments: list[list[float]], period: float) -> Iterator[float]:
+def _fragment_ends(planes: _Track, moments: list[Float64], period: float) -> Iterator[float]:
     """Yield the time at which each fragment ends. planes: the track whose I planes decide."""
-    times = np.array(moments[0])
+    times = moments[0]
     joins = times if planes.sync is None else times[planes.sync]
-    end = max(each[-1] for each in moments)
+    end = max(float(each[-1]) for each in moments)
     begin = 0.0
     while begin + period <= end:
         next_join = int(np.searchsorted(joins, begin + period - 1e-9))

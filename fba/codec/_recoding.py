@@ -11,7 +11,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Int64
 from fba.codec._block import Block
 from fba.codec._decoder import Decoder
-from fba.codec._frame_buffers import FrameBuffer
+from fba.codec._frame_buffers import CompactBuffer
 from fba.codec._plane import slots
 from fba.codec._script import encode_planes
 from fba.codec._stream.mark import marked_table
@@ -59,7 +59,7 @@ def read_planes(
     bap_steps: as for `decode`. Raises BitstreamError, UnsupportedError, LimitError.
     """
     table = bap_steps or marked_table(data) or BAP_STEPS_DEFAULT
-    decoder, buffer = Decoder(bap_steps=table, limits=limits), FrameBuffer()
+    decoder, buffer = Decoder(bap_steps=table, limits=limits), CompactBuffer(limits, len(data))
     settings: list[PlaneSettings] = []
     begins: list[Int64] = []
     ends: list[Int64] = []
@@ -70,7 +70,6 @@ def read_planes(
             begins.append(block.borders[:-1])
             ends.append(block.borders[1:])
             buffer.add(block)
-        limits.check_frames(len(settings), "the stream")
         limits.check_bytes(len(settings) * _PLANE_BYTES, "the list of planes", source=len(data))
 
     for start in range(0, len(data), _CHUNK_BYTES):
@@ -78,8 +77,9 @@ def read_planes(
     add(decoder.finish_blocks())
     if not settings:
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0)
-    animation = buffer.decoded().animation()
-    return StreamPlanes(animation, tuple(settings), np.concatenate(begins), np.concatenate(ends), table)
+    return StreamPlanes(
+        buffer.animation(), tuple(settings), np.concatenate(begins), np.concatenate(ends), table
+    )
 
 
 def recode(planes: StreamPlanes, coded: Bool) -> bytes:
@@ -101,12 +101,14 @@ def _settings(block: Block, number: int) -> Iterator[PlaneSettings]:
     whole = block.settings
     for position, (parts, skip) in enumerate(zip(block.parts.tolist(), block.skips.tolist(), strict=True)):
         face, body = parts & slots.FACE_BIT, parts & slots.BODY_BIT
-        yield replace(
-            whole,
-            face_frame=number + position if face else None,
-            body_frame=number + position if body else None,
-            face=whole.face if face else None,
-            body=whole.body if body else None,
-            skip=skip,
-            start_code=whole.start_code and position == 0,
+        yield PlaneSettings(
+            whole.intra,
+            number + position if face else None,
+            number + position if body else None,
+            whole.face if face else None,
+            whole.body if body else None,
+            whole.frame_rate,
+            whole.time_code,
+            skip,
+            whole.start_code and position == 0,
         )

@@ -173,11 +173,6 @@ _FORMATS = (
         read_stream=_lazy("_fba", "read_stream"),
     ),
     Format(
-        "mp4", (".mp4", ".m4v", ".mov"), "MP4 file with an FBA stream, and perhaps sound",
-        _lazy("_mp4", "sniff_mp4"), _lazy("_mp4", "write_mp4"), read_animation=_lazy("_mp4", "read_mp4"),
-        read_stream=_lazy("_mp4", "read_stream"),
-    ),
-    Format(
         "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
         _lazy("text.fap", "sniff_fap"), _lazy("text.fap", "write_fap"), ("face",),
         read_animation=_lazy("text.fap", "read_fap"),
@@ -214,6 +209,11 @@ _FORMATS = (
     Format(
         "smpl", (".npz",), "motion of SMPL, SMPL-H and SMPL-X bodies, as AMASS saves it",
         _lazy("smpl._reader", "sniff"), read_motion=_lazy("smpl._reader", "read_motion"), kind="skeleton",
+    ),
+    Format(
+        "mp4", (".mp4", ".m4v", ".mov"), "MP4 file with an FBA stream, and perhaps sound",
+        _lazy("_mp4", "sniff_mp4"), _lazy("_mp4", "write_mp4"), read_animation=_lazy("_mp4", "read_mp4"),
+        read_stream=_lazy("_mp4", "read_stream"),
     ),
     _face("openface", ".csv", "action units, pose and gaze of OpenFace", "_openface"),
     _face("pyfeat", ".csv", "blendshapes or action units of py-feat", "_pyfeat"),

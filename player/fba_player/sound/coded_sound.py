@@ -83,7 +83,8 @@ def _read_packets(
                 )
     except av.error.FFmpegError:
         return None  # damaged: decoding leaves out the damaged part
-    durations: Int64 = np.diff(np.array([*times, times[-1] + last if times else 0], dtype=np.int64))
+    all_times: Int64 = np.array([*times, times[-1] + last if times else 0], dtype=np.int64)
+    durations = all_times[1:] - all_times[:-1]
     if not packets or (durations <= 0).any() or (durations >= 1 << 32).any():
         return None
     skipped = max((stream.start_time or 0) - times[0], 0)
