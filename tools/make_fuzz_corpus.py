@@ -24,12 +24,14 @@ sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files",
 from fba.arrays import Float64  # noqa: E402
 from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
+from fba.carriage.mp4 import split_samples, write_mp4  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.live import KINDS  # noqa: E402
 from fba.persona import learn  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
+from mp4_files import Track, esds, fragmented_file, whole_file  # noqa: E402
 from small_bodies import rod  # noqa: E402
 from small_people import write_person  # noqa: E402
 from stored_models import face  # noqa: E402
@@ -432,6 +434,39 @@ def markers() -> dict[str, bytes]:
     return {f"markers_{name.replace('.', '_')}": data for name, data in found.items()}
 
 
+def mp4() -> dict[str, bytes]:
+    """Return MP4 files with streams: those of this program, and with the boxes of others."""
+    streams = small_streams()
+    talking, body = split_samples(streams["talking"]), split_samples(streams["named_before"])
+    sync = [number for number, joins in enumerate(body.sync.tolist(), 1) if joins]
+    visual = esds(body.configuration, digits=4)
+    track = Track(
+        body.planes,
+        sync=sync,
+        described=visual,
+        sizes="16",
+        wide=True,
+        chunks=(1, 3),
+        edits=[(40, -1), (0, 1)],
+    )
+    sound = Track(
+        [b"sound"], number=2, handler=b"soun", entry=b"mp4a", described=esds(b"\x11\x90", object_type=64)
+    )
+    return {
+        "whole": write_mp4(streams["talking"]),
+        "checked": write_mp4(streams["checked"]),
+        "fragments": write_mp4(streams["both"], fragment=0.08),
+        "others": whole_file(track, sound, data="rest"),
+        "others_constant": whole_file(
+            Track(talking.planes, sizes="8", version=1), data="long", moov_last=True
+        ),
+        "others_fragments": fragmented_file(
+            Track(body.planes, sync=sync, described=visual), [2], base="old", other=True
+        ),
+        "others_defaults": fragmented_file(Track(talking.planes), [1], base="file", flags="first"),
+    }
+
+
 def smpl() -> dict[str, bytes]:
     """Return motions of SMPL bodies that stand, by one array of poses and by parts, with jaw and eyes."""
     turns = np.zeros((3, 55, 3))
@@ -453,6 +488,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     limb = {name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}
     files: dict[str, dict[str, bytes]] = {
         "stream": {**small_streams(), **doubtful_marks(), **long_streams()},
+        "mp4": mp4(),
         "fap": lines(FAPS),
         "bap": lines(BAPS),
         "epf": lines(EPFS),

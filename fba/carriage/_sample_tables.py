@@ -23,6 +23,8 @@ _LISTED = {"duration": 0x100, "size": 0x200, "flags": 0x400, "shift": 0x800}
 SEVERAL_ENTRIES = "the FBA track changes its configuration on the way (several sample entries); cut it there"
 
 
+_SAMPLE_BYTES = 200
+"""Memory of a sample while its stream is put together."""
 _COLUMNS = ("offsets", "sizes", "durations", "sync")
 
 
@@ -55,6 +57,7 @@ def read_tables(box: Box, entry: int, limits: Limits) -> SampleTable:
     """
     sizes = _read_sizes(box, limits)
     count = len(sizes)
+    check_count(count, limits, len(box.data))
     durations = _read_durations(box.need(b"stts"), count)
     offsets = _read_offsets(box, sizes, entry)
     sync = np.ones(count, dtype=np.bool_)
@@ -68,17 +71,23 @@ def read_tables(box: Box, entry: int, limits: Limits) -> SampleTable:
     return SampleTable(offsets, sizes, durations, sync)
 
 
+def check_count(count: int, limits: Limits, source: int) -> None:
+    """Raise LimitError for too many samples. source: bytes of the file."""
+    limits.check_frames(count, "the track")
+    limits.check_bytes(count * _SAMPLE_BYTES, "the list of samples", source=source)
+
+
 def _read_sizes(box: Box, limits: Limits) -> Int64:
     """Return the sizes of all samples, whose sum is no more than the file."""
     table = box.child(b"stsz")
     if table is not None:
         size, count = table.read("II", 4)
         if size:
-            limits.check_frames(count, f"the table at byte {table.start}")
             if size * count > len(table.data):
                 raise table.broken(
                     f"it announces {count} samples of {size} bytes, more than the file; it is damaged"
                 )
+            check_count(count, limits, len(table.data))
             return np.full(count, size, dtype=np.int64)
         (sizes,) = table.table(12, count, "u4")
     else:
@@ -201,10 +210,12 @@ class Fragments:
         end = at + (int(columns["size"].sum()) if "size" in columns else count * defaults.size)
         if not wanted:
             return end
-        self._count, self._bytes = self._count + count, self._bytes + end - at
-        self._limits.check_frames(self._count, "the track")
+        self._count, self._bytes = self._count + count, self._bytes + max(end - at, count)
         if self._bytes > len(run.data):
-            raise run.broken("the samples of its track have more bytes than the file; it is damaged")
+            raise run.broken(
+                f"its {count} samples, with those before it, have more bytes than the file; it is damaged"
+            )
+        check_count(self._count, self._limits, len(run.data))
         if defaults.entry != self._entry:
             raise UnsupportedError(SEVERAL_ENTRIES, what="several sample entries in a track")
         for name, value in (

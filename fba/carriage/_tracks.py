@@ -166,13 +166,13 @@ def _read_edits(trak: Box, movie_scale: int, timescale: int) -> Fraction:
     form, size = ("Qq", 20) if wide else ("Ii", 12)
     if count * size > edits.end - edits.begin - 8:
         raise edits.broken(f"it announces {count} edits, and has room for fewer; it is damaged")
-    start = Fraction(0)
+    wait = 0
     for number in range(count):
         duration, media_time = edits.read(form, 8 + number * size)
         if media_time != -1:
-            return start - Fraction(max(media_time, 0), timescale)
-        start += Fraction(duration, movie_scale or 1)
-    return start
+            return Fraction(wait, movie_scale or 1) - Fraction(max(media_time, 0), timescale)
+        wait += duration
+    return Fraction(wait, movie_scale or 1)
 
 
 def _read_original(trak: Box) -> bytes:

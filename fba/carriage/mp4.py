@@ -27,8 +27,6 @@ __all__ = [
 ]  # fmt: skip
 
 _FIRST_BOXES = (b"ftyp", b"styp", b"moov", b"mdat", b"free", b"skip", b"wide", b"pnot")
-_SAMPLE_BYTES = 200
-"""Memory of a sample while its stream is put together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +78,6 @@ def read_mp4(
     for moof in moofs:
         fragments.add(moof)
     samples = fragments.table()
-    limits.check_bytes(len(samples) * _SAMPLE_BYTES, "the list of samples", source=len(data))
     planes = _take(data, samples, path, salvage=salvage)
     stream = join_samples(chosen.configuration, planes, chosen.original, limits)
     return Mp4File(stream, chosen.track, tuple(each.track for each in tracks), len(planes), bool(moofs))
