@@ -78,15 +78,11 @@ def check_count(count: int, limits: Limits, source: int) -> None:
 
 
 def _read_sizes(box: Box, limits: Limits) -> Int64:
-    """Return the sizes of all samples, whose sum is no more than the file."""
+    """Return the sizes of all samples."""
     table = box.child(b"stsz")
     if table is not None:
         size, count = table.read("II", 4)
         if size:
-            if size * count > len(table.data):
-                raise table.broken(
-                    f"it announces {count} samples of {size} bytes, more than the file; it is damaged"
-                )
             check_count(count, limits, len(table.data))
             return np.full(count, size, dtype=np.int64)
         (sizes,) = table.table(12, count, "u4")
@@ -102,8 +98,6 @@ def _read_sizes(box: Box, limits: Limits) -> Int64:
             (sizes,) = table.table(12, count, f"u{width // 8}")
         else:
             raise table.broken(f"its sizes have {width} bits, and 4, 8 and 16 are allowed; it is damaged")
-    if int(sizes.sum()) > len(table.data):
-        raise table.broken("its samples have more bytes than the file; it is damaged")
     return sizes
 
 
@@ -164,7 +158,7 @@ class Fragments:
     ) -> None:
         self._track, self._entry, self._defaults, self._limits = track, entry, defaults, limits
         self._parts = [tables]
-        self._count, self._bytes = len(tables), int(tables.sizes.sum())
+        self._count = len(tables)
 
     def add(self, moof: Box) -> None:
         """Add the samples of a fragment."""
@@ -210,11 +204,7 @@ class Fragments:
         end = at + (int(columns["size"].sum()) if "size" in columns else count * defaults.size)
         if not wanted:
             return end
-        self._count, self._bytes = self._count + count, self._bytes + max(end - at, count)
-        if self._bytes > len(run.data):
-            raise run.broken(
-                f"its {count} samples, with those before it, have more bytes than the file; it is damaged"
-            )
+        self._count += count
         check_count(self._count, self._limits, len(run.data))
         if defaults.entry != self._entry:
             raise UnsupportedError(SEVERAL_ENTRIES, what="several sample entries in a track")

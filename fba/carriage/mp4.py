@@ -126,5 +126,11 @@ def _take(data: bytes, samples: SampleTable, path: Path | None, *, salvage: bool
             raise FormatError(finding, path=path)
         warnings.warn(f"{finding}; the {first} samples before it are read", FbaWarning, stacklevel=3)
         count = first
+    if int(samples.sizes[:count].sum()) > len(data):
+        raise FormatError(
+            f"the samples of the FBA track have {samples.sizes[:count].sum()} bytes, and the MP4 file has "
+            f"{len(data)}: they overlap, so it is damaged",
+            path=path,
+        )
     starts, stops = samples.offsets[:count].tolist(), ends[:count].tolist()
     return [data[start:stop] for start, stop in zip(starts, stops, strict=True)]

@@ -111,7 +111,7 @@ class Track:
             full(b"stsd", 0, 0, numbers(1), self.sample_entry()),
             full(b"stts", 0, 0, numbers(len(times)), *times),
             full(b"stss", 0, 0, numbers(len(self.sync)), numbers(*self.sync))
-            if self.sync is not None
+            if self.sync is not None and offsets is not None
             else b"",
             full(b"stsc", 0, 0, numbers(len(runs)), *runs),
             table,
