@@ -6,6 +6,8 @@ import json
 import shutil
 import wave
 from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -92,12 +94,12 @@ def test_sound_that_begins_before_the_first_frame(run: Callable[..., Run], strea
         assert sound.start == 0
 
 
-@pytest.mark.parametrize("frames", [1, 10, 100])
+@pytest.mark.parametrize("frames", [1, 10, 60])
 def test_sound_may_be_longer_and_shorter_than_the_stream(
     run: Callable[..., Run], tmp_path: Path, voice: Path, frames: int
 ) -> None:
     source, target = tmp_path / "part.fba", tmp_path / "part.mp4"
-    source.write_bytes(encode_animation(performance()[:frames])[0])
+    source.write_bytes(encode_animation(replace(performance()[:frames], rate=Fraction(5)))[0])
     for fragment in ((), ("--fragment", 1)):
         assert run("convert", source, target, "--audio", voice, *fragment).code == 0
         assert len(fba.read(target)) == frames

@@ -193,7 +193,7 @@ def fragmented_file(
     parts = [box(b"ftyp", b"iso5", numbers(0), b"iso5"), movie(traks, box(b"mvex", *trex))]
     borders = [0, *cuts, len(track.samples)]
     for number, (first, stop) in enumerate(pairwise(borders), 1):
-        samples, begun = track.samples[first:stop], sum(map(len, parts))
+        samples, begun = track.samples[first:stop], sum(map(len, parts)) if base == "file" else 0
         noise = b"sound" * other
         size = 0
         for _ in range(2):  # once for its length
