@@ -167,8 +167,8 @@ def _code_again(
     if kind is None:
         return cut[1], b""
     head, tail = data[: int(planes.begins[0]) // 8], data[_aligned(data, int(planes.ends[-1])) :]
-    again = head + recode(planes, planes.coded)[len(OBJECT_CODE) : -len(END_CODE)] + tail
-    return cut[1], _pack(kind, count, head, tail) if again == data else b""
+    restored = head + recode(planes, planes.coded)[len(OBJECT_CODE) : -len(END_CODE)] + tail
+    return cut[1], _pack(kind, count, head, tail) if restored == data else b""
 
 
 def _codes(kind: int, intra: Bool) -> Bool:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Run
 
 import fba
 from fba.arrays import Float64
@@ -25,6 +24,7 @@ from fba_player.sound.coded_sound import read_coded_sound
 from joinable_streams import JOINABLE, performance
 from mp4_files import Track, whole_file
 
+Run = Callable[..., Any]
 RATE = 16_000
 SECONDS = 3
 
@@ -70,7 +70,7 @@ def fit(path: Path) -> tuple[float, float]:
 @pytest.mark.parametrize("coding", ["aac", "opus"])
 @pytest.mark.parametrize("offset", [0, 0.25])
 def test_sound_is_heard_when_it_is_due(
-    run: Callable[..., Run], stream: Path, voice: Path, coding: str, offset: float, fragment: tuple[str, ...]
+    run: Run, stream: Path, voice: Path, coding: str, offset: float, fragment: tuple[str, ...]
 ) -> None:
     target = stream.with_suffix(".fba.mp4")
     options = ["--audio", voice, "--audio-codec", coding, "--audio-offset", offset, *fragment]
@@ -86,7 +86,7 @@ def test_sound_is_heard_when_it_is_due(
     assert back.read_bytes() == stream.read_bytes()
 
 
-def test_sound_that_begins_before_the_first_frame(run: Callable[..., Run], stream: Path, voice: Path) -> None:
+def test_sound_that_begins_before_the_first_frame(run: Run, stream: Path, voice: Path) -> None:
     target = stream.with_suffix(".mp4")
     assert run("convert", stream, target, "--audio", voice, "--audio-offset", -0.5).code == 0
     with SoundFile(target) as sound:
@@ -96,7 +96,7 @@ def test_sound_that_begins_before_the_first_frame(run: Callable[..., Run], strea
 
 @pytest.mark.parametrize("frames", [1, 10, 60])
 def test_sound_may_be_longer_and_shorter_than_the_stream(
-    run: Callable[..., Run], tmp_path: Path, voice: Path, frames: int
+    run: Run, tmp_path: Path, voice: Path, frames: int
 ) -> None:
     source, target = tmp_path / "part.fba", tmp_path / "part.mp4"
     source.write_bytes(encode_animation(replace(performance()[:frames], rate=Fraction(5)))[0])
@@ -107,7 +107,7 @@ def test_sound_may_be_longer_and_shorter_than_the_stream(
             assert abs(len(sound.read(0, 10 * RATE)) / sound.rate - SECONDS) < 0.15
 
 
-def test_coded_sound_is_copied(run: Callable[..., Run], stream: Path, voice: Path, tmp_path: Path) -> None:
+def test_coded_sound_is_copied(run: Run, stream: Path, voice: Path, tmp_path: Path) -> None:
     first, second = tmp_path / "first.mp4", tmp_path / "second.mp4"
     for coding in ("aac", "opus"):
         run("convert", stream, first, "--audio", voice, "--audio-codec", coding, "--audio-offset", 0.25)
@@ -123,7 +123,7 @@ def test_coded_sound_is_copied(run: Callable[..., Run], stream: Path, voice: Pat
     assert list_tracks(second.read_bytes())[1].coding == "AAC"
 
 
-def test_all_commands_read_them(run: Callable[..., Run], stream: Path, tmp_path: Path) -> None:
+def test_all_commands_read_them(run: Run, stream: Path, tmp_path: Path) -> None:
     film = tmp_path / "film.mp4"
     assert run("convert", stream, film, "--no-audio").code == 0
     for command in ("verify", "stats"):
@@ -153,9 +153,7 @@ def test_all_commands_read_them(run: Callable[..., Run], stream: Path, tmp_path:
     assert run("info", "--trace", film).out == run("info", "--trace", stream).out
 
 
-def test_a_page_takes_the_sound_alone(
-    run: Callable[..., Run], stream: Path, voice: Path, tmp_path: Path
-) -> None:
+def test_a_page_takes_the_sound_alone(run: Run, stream: Path, voice: Path, tmp_path: Path) -> None:
     film, page = tmp_path / "film.mp4", tmp_path / "film.html"
     assert run("convert", stream, film, "--audio", voice, "--audio-offset", 0.5).code == 0
     assert run("export", film, "-o", page).code == 0
@@ -165,7 +163,7 @@ def test_a_page_takes_the_sound_alone(
 
 
 def test_the_sound_of_the_file_comes_before_the_one_beside(
-    run: Callable[..., Run], stream: Path, voice: Path, tmp_path: Path
+    run: Run, stream: Path, voice: Path, tmp_path: Path
 ) -> None:
     film = tmp_path / "voice.mp4"
     run("convert", stream, film, "--audio", voice)
@@ -178,7 +176,7 @@ def test_the_sound_of_the_file_comes_before_the_one_beside(
     assert find_sound((film,), SoundOptions(), "without") == voice
 
 
-def test_other_files_become_mp4_as_well(run: Callable[..., Run], tmp_path: Path, stream: Path) -> None:
+def test_other_files_become_mp4_as_well(run: Run, tmp_path: Path, stream: Path) -> None:
     run("decode", stream, "--fap", tmp_path / "a.fap")
     assert run("convert", tmp_path / "a.fap", tmp_path / "a.mp4", "--fragment", 2).code == 0
     assert fba.read(tmp_path / "a.mp4").face == fba.read(tmp_path / "a.fap").face
@@ -186,7 +184,7 @@ def test_other_files_become_mp4_as_well(run: Callable[..., Run], tmp_path: Path,
     assert fba.read(tmp_path / "b.mp4").rate == 10
 
 
-def test_out_again_by_another_table_or_rate(run: Callable[..., Run], stream: Path, tmp_path: Path) -> None:
+def test_out_again_by_another_table_or_rate(run: Run, stream: Path, tmp_path: Path) -> None:
     film, back = tmp_path / "film.mp4", tmp_path / "back.fba"
     run("convert", stream, film)
     assert run("convert", film, back, "--no-mark").code == 0
@@ -199,7 +197,7 @@ def test_out_again_by_another_table_or_rate(run: Callable[..., Run], stream: Pat
     assert marked_table(read_mp4(film.read_bytes()).stream) == "visage"
 
 
-def test_of_several_streams_one_is_named(run: Callable[..., Run], stream: Path, tmp_path: Path) -> None:
+def test_of_several_streams_one_is_named(run: Run, stream: Path, tmp_path: Path) -> None:
     from fba.carriage.mp4 import split_samples
 
     planes = split_samples(encode_animation(performance(body=False)[:30])[0]).planes
@@ -215,7 +213,7 @@ def test_of_several_streams_one_is_named(run: Callable[..., Run], stream: Path, 
     assert json.loads(run("verify", "--json", film, "--track", 3).out)["frames"] == 9
 
 
-def test_a_cut_file_is_salvaged(run: Callable[..., Run], stream: Path, tmp_path: Path) -> None:
+def test_a_cut_file_is_salvaged(run: Run, stream: Path, tmp_path: Path) -> None:
     film = tmp_path / "cut.mp4"
     film.write_bytes(write_mp4(stream.read_bytes())[:-2000])
     failed = run("convert", film, tmp_path / "out.fba")
@@ -227,7 +225,7 @@ def test_a_cut_file_is_salvaged(run: Callable[..., Run], stream: Path, tmp_path:
     assert 0 < len(fba.read(tmp_path / "out.fba")) < len(fba.read(stream))
 
 
-def test_options_that_do_not_fit(run: Callable[..., Run], stream: Path, voice: Path, tmp_path: Path) -> None:
+def test_options_that_do_not_fit(run: Run, stream: Path, voice: Path, tmp_path: Path) -> None:
     for option in (("--fragment", 2), ("--audio", voice), ("--audio-codec", "opus"), ("--no-audio",)):
         wrong = run("convert", stream, tmp_path / "a.fap", *option)
         assert wrong.code == 2
@@ -245,7 +243,7 @@ def test_options_that_do_not_fit(run: Callable[..., Run], stream: Path, voice: P
     assert not (tmp_path / "a.mp4").exists()
 
 
-def test_a_film_is_no_stream(run: Callable[..., Run], voice: Path, tmp_path: Path) -> None:
+def test_a_film_is_no_stream(run: Run, voice: Path, tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     film = tmp_path / "film.mp4"
     with av.open(str(film), "w") as container:
