@@ -41,8 +41,8 @@ def performance(face: bool = True, body: bool = True, rate: int = 25, first: int
 def test_the_table() -> None:
     assert [entry.name for entry in formats()] == [
         "fba", "fap", "bap", "epf", "bvh", "vrma", "gltf", "smpl", "mp4", "openface", "pyfeat",
-        "livelink", "livelink-udp", "ifacialmocap", "shapes-json", "points", "c3d", "trc", "motive", "nexus", "qualisys",
-        "markers",
+        "livelink", "livelink-udp", "ifacialmocap", "shapes-json", "points", "c3d", "trc", "motive", "nexus",
+        "qualisys", "markers",
     ]  # fmt: skip
     by_name = {entry.name: entry for entry in formats()}
     assert by_name["fap"].read_options == ("source_rate", "name", "salvage", "angle_scale", "limits")
