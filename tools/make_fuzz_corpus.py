@@ -435,35 +435,20 @@ def markers() -> dict[str, bytes]:
 
 
 def mp4() -> dict[str, bytes]:
-    """Return MP4 files with streams: those of this program, and with the boxes of others."""
-    streams = small_streams()
-    talking, body = split_samples(streams["talking"]), split_samples(streams["named_before"])
-    sync = [number for number, joins in enumerate(body.sync.tolist(), 1) if joins]
-    visual = esds(body.configuration, digits=4)
-    track = Track(
-        body.planes,
-        sync=sync,
-        described=visual,
-        sizes="16",
-        wide=True,
-        chunks=(1, 3),
-        edits=[(40, -1), (0, 1)],
-    )
-    sound = Track(
-        [b"sound"], number=2, handler=b"soun", entry=b"mp4a", described=esds(b"\x11\x90", object_type=64)
-    )
+    """Return small MP4 files with streams: those of this program, and with the boxes of others."""
+    stream = small_streams()["one_fap"]
+    samples = split_samples(stream)
+    planes, sync = samples.planes, [1, 3, 5]
+    edits, visual = [(40, -1), (0, 1)], esds(samples.configuration, digits=4)
+    other = Track(planes, sync=sync, described=visual, sizes="16", wide=True, chunks=(1, 3), edits=edits)
     return {
-        "whole": write_mp4(streams["talking"]),
-        "checked": write_mp4(streams["checked"]),
-        "fragments": write_mp4(streams["both"], fragment=0.08),
-        "others": whole_file(track, sound, data="rest"),
-        "others_constant": whole_file(
-            Track(talking.planes, sizes="8", version=1), data="long", moov_last=True
-        ),
+        "whole": write_mp4(stream),
+        "fragments": write_mp4(stream, fragment=0.16),
+        "others": whole_file(other, data="rest"),
+        "others_compact": whole_file(Track(planes, sizes="8", version=1), data="long", moov_last=True),
         "others_fragments": fragmented_file(
-            Track(body.planes, sync=sync, described=visual), [2], base="old", other=True
+            Track(planes, sync=sync), [4], base="old", flags="first", other=True
         ),
-        "others_defaults": fragmented_file(Track(talking.planes), [1], base="file", flags="first"),
     }
 
 
