@@ -446,9 +446,7 @@ def mp4() -> dict[str, bytes]:
         "fragments": write_mp4(stream, fragment=0.16),
         "others": whole_file(other, data="rest"),
         "others_compact": whole_file(Track(planes, sizes="8", version=1), data="long", moov_last=True),
-        "others_fragments": fragmented_file(
-            Track(planes, sync=sync), [4], base="old", flags="first", other=True
-        ),
+        "others_fragments": fragmented_file(Track(planes, sync=sync), [4], base="file", flags="first"),
     }
 
 
