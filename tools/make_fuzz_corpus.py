@@ -438,7 +438,7 @@ def mp4() -> dict[str, bytes]:
     """Return small MP4 files with streams: those of this program, and with the boxes of others."""
     stream = small_streams()["one_fap"]
     samples = split_samples(stream)
-    planes, sync = samples.planes, [1, 3, 5]
+    planes, sync = samples.planes[:4], [1, 3]
     edits, visual = [(40, -1), (0, 1)], esds(samples.configuration, digits=4)
     other = Track(planes, sync=sync, described=visual, sizes="16", wide=True, chunks=(1, 3), edits=edits)
     return {
@@ -446,7 +446,7 @@ def mp4() -> dict[str, bytes]:
         "fragments": write_mp4(stream, fragment=0.16),
         "others": whole_file(other, data="rest"),
         "others_compact": whole_file(Track(planes, sizes="8", version=1), data="long", moov_last=True),
-        "others_fragments": fragmented_file(Track(planes, sync=sync), [4], base="file", flags="first"),
+        "others_fragments": fragmented_file(Track(planes, sync=sync), [2], base="file", flags="first"),
     }
 
 
