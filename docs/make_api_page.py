@@ -10,7 +10,8 @@ from typing import Any, Literal, get_args, get_origin
 
 PAGE = Path(__file__).parent / "api.md"
 ROOMS = (
-    "fba", "fba.formats", "fba.codec", "fba.planning", "fba.planning.rate", "fba.parameters",
+    "fba", "fba.formats", "fba.codec", "fba.carriage.mp4", "fba.planning", "fba.planning.rate",
+    "fba.parameters",
     "fba.face", "fba.face.importers", "fba.face.authoring", "fba.face.calibration", "fba.face.checks",
     "fba.face.learning", "fba.body", "fba.body.gait", "fba.capture", "fba.capture.markers",
     "fba.capture.points", "fba.capture.virtual_markers", "fba.emotion", "fba.persona", "fba.live",

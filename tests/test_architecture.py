@@ -36,6 +36,7 @@ fba.codec.settings
 fba.codec._plane
 fba.codec._stream
 fba.codec
+fba.carriage
 fba.face.interpolation
 fba.face
 fba.face.deform

@@ -25,6 +25,7 @@ import avatar_files  # noqa: E402
 from fba.arrays import Float64  # noqa: E402
 from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
+from fba.carriage.mp4 import split_samples, write_mp4  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.formats import read_motion  # noqa: E402
 from fba.live import KINDS  # noqa: E402
@@ -32,6 +33,7 @@ from fba.persona import learn  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
+from mp4_files import Track, esds, fragmented_file, whole_file  # noqa: E402
 from small_bodies import rod  # noqa: E402
 from small_people import write_person  # noqa: E402
 from stored_models import face  # noqa: E402
@@ -434,6 +436,22 @@ def markers() -> dict[str, bytes]:
     return {f"markers_{name.replace('.', '_')}": data for name, data in found.items()}
 
 
+def mp4() -> dict[str, bytes]:
+    """Return small MP4 files with streams: those of this program, and with the boxes of others."""
+    stream = small_streams()["one_fap"]
+    samples = split_samples(stream)
+    planes, sync = samples.planes[:4], [1, 3]
+    edits, visual = [(40, -1), (0, 1)], esds(samples.configuration, digits=4)
+    other = Track(planes, sync=sync, described=visual, sizes="16", wide=True, chunks=(1, 3), edits=edits)
+    return {
+        "whole": write_mp4(stream),
+        "fragments": write_mp4(stream, fragment=0.16),
+        "others": whole_file(other, data="rest"),
+        "others_compact": whole_file(Track(planes, sizes="8", version=1), data="long", moov_last=True),
+        "others_fragments": fragmented_file(Track(planes, sync=sync), [2], base="file", flags="first"),
+    }
+
+
 def smpl() -> dict[str, bytes]:
     """Return motions of SMPL bodies that stand, by one array of poses and by parts, with jaw and eyes."""
     turns = np.zeros((3, 55, 3))
@@ -471,6 +489,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     limb = {name: BODY[name] for name in ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot")}
     files: dict[str, dict[str, bytes]] = {
         "stream": {**small_streams(), **doubtful_marks(), **long_streams()},
+        "mp4": mp4(),
         "fap": lines(FAPS),
         "bap": lines(BAPS),
         "epf": lines(EPFS),

@@ -23,7 +23,7 @@ DEV = "FBA_DEV"
 """Environment variable that `./dev` sets for the commands it starts: its own path, as the user typed it."""
 OPTIONS = {name: name for name in (
     "source_rate", "rate", "bit_rate", "buffer", "format", "salvage", "clamp", "points", "kind", "replace",
-    "clip", "face", "aspect", "neutral", "sync", "offset", "rest", "up", "scale",
+    "clip", "track", "face", "aspect", "neutral", "sync", "offset", "rest", "up", "scale",
 )} | {"limits": "limit", "joints": "maps", "markers": "maps"}  # fmt: skip
 """Parameters of commands, by the arguments of the library that do the same."""
 OTHER_COMMANDS = (("encode",), ("convert",), ("model", "import"))

@@ -22,7 +22,7 @@ from fba.cli.option_fields import option
 from fba.errors import FbaError, FbaWarning, FormatError, OptionError
 from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO, BapTable
-from fba.source import read_whole
+from fba.source import read_head
 
 if TYPE_CHECKING:
     from fba.body import BodyModel
@@ -95,6 +95,11 @@ class Reading:
         help="Which animation of a glTF file with several, by name or number; `fba info` lists them.",
     )
     bap_steps: BapTableOrAuto = options.read_steps_option
+    track: int | None = option(
+        type=click.IntRange(1, 0xFFFFFFFF),
+        metavar="NUMBER",
+        help="Which FBA track of an MP4 file with several; the error for such a file lists them.",
+    )
     salvage: bool = option(
         default=False, help="Read the undamaged parts of damaged input, and list what was lost."
     )
@@ -106,6 +111,7 @@ class ReadFile:
     """An animation and its file.
 
     rate: of the file, before it was resampled. captured: a capture with its animation; None for other files.
+    stream: the bytes of the FBA stream in the file; None for other files.
     table: of BAP steps, of a stream with a body; else None. doubt: the warning that this table looks wrong,
     or None.
     """
@@ -117,6 +123,7 @@ class ReadFile:
     captured: Captured | None = None
     table: BapTable | None = None
     doubt: str | None = None
+    stream: bytes | None = None
 
 
 def read_input(
@@ -145,10 +152,11 @@ def read_file(
     table: BapTable | None = None
     marked: BapTable | None = None
     doubt: str | None = None
+    data: bytes | None = None
     with input_file(path) as file:
         reader = find_format(file, reading.format)
-        if reader.name == "fba":
-            data = read_whole(file)
+        if reader.read_stream is not None:
+            data = read_stream(file, reading, reader)
             marked = marked_table(data)
             table = step_tables.table_to_read(path, data, reading.bap_steps, limits)
         given: dict[str, object] = {
@@ -159,6 +167,7 @@ def read_file(
             "rate": rate,
             "limits": limits,
             "clip": reading.clip,
+            "track": reading.track,
             **(capture or {}),
         }
         taken = taken_options(given, reader.read_options)
@@ -171,7 +180,22 @@ def read_file(
     read_rate = animation.rate
     if rate is not None and read_rate != rate:
         animation = animation.resample(rate, limits=limits)
-    return ReadFile(path, animation, reader, read_rate, captured, table, doubt)
+    return ReadFile(path, animation, reader, read_rate, captured, table, doubt, data)
+
+
+def read_stream(file: Path, reading: Reading, reader: Format | None = None) -> bytes:
+    """Return the bytes of the FBA stream in a file: of the file itself, or of a track of an MP4 file.
+
+    reader: the format of the file, if that is known. A file of another format is taken for a stream, so that
+    its decoder says what is wrong.
+    """
+    from fba.formats import formats
+
+    by_name = {each.name: each for each in formats()}
+    if reader is None:
+        reader = by_name["mp4" if by_name["mp4"].sniff(read_head(file), "") else "fba"]
+    assert reader.read_stream is not None
+    return reader.read_stream(file, track=reading.track, salvage=reading.salvage, limits=reading.limit)
 
 
 def probe_input(path: Path, reading: Reading) -> StreamInfo:
@@ -179,7 +203,12 @@ def probe_input(path: Path, reading: Reading) -> StreamInfo:
     from fba.formats import probe
 
     reader = find_format(path, reading.format)
-    given = {"source_rate": reading.source_rate, "salvage": reading.salvage or None, "clip": reading.clip}
+    given = {
+        "source_rate": reading.source_rate,
+        "salvage": reading.salvage or None,
+        "clip": reading.clip,
+        "track": reading.track,
+    }
     taken = {} if reader.name == "fba" else taken_options(given, reader.read_options)
     return probe(path, format=reader.name, limits=reading.limit, **taken)
 

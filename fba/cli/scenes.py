@@ -19,12 +19,14 @@ from fba.cli import inputs, options
 from fba.cli.inputs import Reading
 from fba.cli.map_options import MAP, Maps, read_body_joints
 from fba.cli.option_fields import option
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FbaError, FbaWarning, FormatError
+from fba.source import read_head, read_whole
 
 if TYPE_CHECKING:
     from io import BufferedReader
 
     from fba.body import BodyModel
+    from fba.carriage.mp4 import Mp4Track
     from fba.face import FaceModel
     from fba_player.playback.live import LiveAnimation
     from fba_player.scene.scene import Scene
@@ -98,7 +100,8 @@ class SoundOptions:
     audio: Path | None = option(
         type=options.FILE,
         metavar="FILE",
-        help="Sound, from the first frame. Default: the WAV file of the same name beside the input.",
+        help="Sound, from the first frame. Default: that of an MP4 file, else the WAV file of the same name "
+        "beside the input.",
     )
     no_audio: bool = option(default=False, help="No sound.")
     audio_offset: float = option(
@@ -114,16 +117,21 @@ def check_files(files: tuple[Path, ...], how: SceneOptions, sound: SoundOptions,
 
     what: "window" or "picture", for messages.
     """
-    if sound.audio is not None and sound.no_audio:
-        raise click.UsageError("--audio and --no-audio contradict each other")
-    if sound.audio_offset and sound.no_audio:
-        raise click.UsageError("--audio-offset and --no-audio contradict each other")
+    check_sound_options(sound)
     inputs.check_clip(how, files)
     if len(files) > MOST_FILES:
         raise click.UsageError(f"{len(files)} files are too many for one {what}; at most {MOST_FILES}")
     if len(files) < 2 and how.arrange is not None:
         single = f"; {files[0]} is one" if files else ""
         raise click.UsageError(f"--arrange needs two files or more{single}")
+
+
+def check_sound_options(sound: SoundOptions) -> None:
+    """Raise click.UsageError for options of the sound that contradict each other."""
+    if sound.audio is not None and sound.no_audio:
+        raise click.UsageError("--audio and --no-audio contradict each other")
+    if sound.audio_offset and sound.no_audio:
+        raise click.UsageError("--audio-offset and --no-audio contradict each other")
 
 
 def open_file(file: Path, how: SceneOptions) -> inputs.ReadFile | LiveAnimation:
@@ -197,7 +205,7 @@ def display_names(files: tuple[Path, ...]) -> list[str]:
 
 
 def find_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
-    """Return the given sound, else the first readable sound beside a file, else None.
+    """Return the given sound, else the first readable sound in or beside a file, else None.
 
     without: begins the warning about an unreadable sound. Raises FormatError if the given sound cannot be
     read, click.UsageError for an offset without a sound.
@@ -206,6 +214,30 @@ def find_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Pa
     if path is None and sound.audio_offset:
         raise click.UsageError("--audio-offset needs a sound: give one with --audio")
     return path
+
+
+def find_offset(audio: Path | None, files: tuple[Path, ...], sound: SoundOptions) -> float:
+    """Return the seconds by which a sound begins after the first frame.
+
+    That is `--audio-offset`, and for the sound of an MP4 file that is shown, also what its tracks say.
+    """
+    if audio is None or audio not in files:
+        return sound.audio_offset
+    from fba_player.sound.audio_file import SoundFile
+
+    planes = next((float(each.start) for each in _tracks(audio) if each.is_fba), 0.0)
+    with SoundFile(audio) as heard:
+        return sound.audio_offset + heard.start - planes
+
+
+def _tracks(file: Path) -> tuple[Mp4Track, ...]:
+    """Return the tracks of an MP4 file; none of another file, or of one that cannot be read."""
+    from fba.carriage.mp4 import is_mp4, list_tracks
+
+    try:
+        return list_tracks(read_whole(file), file) if is_mp4(read_head(file)) else ()
+    except FbaError:
+        return ()  # its reader says why
 
 
 def _choose_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) -> Path | None:
@@ -217,7 +249,11 @@ def _choose_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) ->
     if sound.no_audio:
         return None
     for file in files:
-        path = None if str(file) == "-" or is_pipe(file) else find_sound_beside(file)
+        if str(file) == "-" or is_pipe(file):
+            continue
+        tracks = _tracks(file)
+        inside = any(each.is_fba for each in tracks) and any(each.kind == "soun" for each in tracks)
+        path = file if inside else find_sound_beside(file)
         if path is None:
             continue
         try:

@@ -17,6 +17,7 @@ from fba.codec._quantisation import (
     range_limit,
     step_scale,
 )
+from fba.codec._recoding import StreamPlanes, read_planes, recode
 from fba.codec._script import encode_planes
 from fba.codec._stream.damage import Damage
 from fba.codec._stream.mark import marked_table, write_mark, write_opening
@@ -43,6 +44,7 @@ __all__ = [
     "PlaneSettings",
     "RangeLists",
     "StreamInfo",
+    "StreamPlanes",
     "TimeCode",
     "Verification",
     "coarsest_quantisers",
@@ -57,6 +59,8 @@ __all__ = [
     "probe_stream",
     "quantise",
     "range_limit",
+    "read_planes",
+    "recode",
     "step_scale",
     "verify_stream",
     "write_mark",

@@ -52,9 +52,20 @@ def read_fba(
 
     Raises FormatError for the file, BitstreamError, UnsupportedError and LimitError for the stream.
     """
+    return decode_file(path, read_stream(path), bap_steps, salvage=salvage, limits=limits)
+
+
+def read_stream(path: Path, **_options: object) -> bytes:
+    """Return the bytes of the stream, which are the file. Raises FormatError."""
+    return read_whole(path)
+
+
+def decode_file(
+    path: Path, data: bytes, bap_steps: BapTableOrAuto | None, *, salvage: bool, limits: Limits
+) -> Animation:
+    """Return the animation of a stream that was read from a file; see `read_fba`."""
     from fba.codec import decode
 
-    data = read_whole(path)
     if bap_steps == BAP_STEPS_AUTO:
         from fba.formats.step_choice import choose_steps
 
@@ -83,11 +94,11 @@ def write_fba(
         file.write(data)
 
 
-def _encoder_settings() -> tuple[str, ...]:
+def encoder_settings() -> tuple[str, ...]:
     """Return the names of the keywords of `write_fba`."""
     from fba.codec import EncoderOptions
 
     return (*(field.name for field in fields(EncoderOptions)), "tolerance", "bit_rate")
 
 
-write_fba.extra_options = _encoder_settings  # type: ignore[attr-defined]
+write_fba.extra_options = encoder_settings  # type: ignore[attr-defined]

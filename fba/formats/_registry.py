@@ -10,7 +10,7 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +66,8 @@ class Format:
     may hold any of these. `read` makes animations of motions and faces. kind: of the capture, see
     `fba.capture.capture_options`; "" for files of FAPs and BAPs.
 
+    read_stream: returns the bytes of the FBA stream in a file.
+
     describe: describes a file that may hold several animations, of which `clip` of `read` chooses, or none.
     """
 
@@ -82,6 +84,7 @@ class Format:
     kind: str = ""
     describe: Callable[..., Content] | None = None
     written: str = ""
+    read_stream: Callable[..., bytes] | None = None
 
     def read(self, path: Path, **options: Any) -> Animation:
         """Return the animation of a file. options: of `read_options`."""
@@ -168,6 +171,7 @@ _FORMATS = (
     Format(
         "fba", (".fba",), "MPEG-4 Face and Body Animation stream",
         _lazy("_fba", "sniff_fba"), _lazy("_fba", "write_fba"), read_animation=_lazy("_fba", "read_fba"),
+        read_stream=_lazy("_fba", "read_stream"),
     ),
     Format(
         "fap", (".fap",), "ASCII face animation parameters, versions 2.0 to 2.2",
@@ -213,6 +217,11 @@ _FORMATS = (
         read_person=_lazy("avatar._reader", "read_person"),
         read_motion=_lazy("avatar._reader", "read_motion"), kind="skeleton",
         written="avatar animation units (ISO/IEC 23090-39)",
+    ),
+    Format(
+        "mp4", (".mp4", ".m4v", ".mov"), "MP4 file with an FBA stream, and perhaps sound",
+        _lazy("_mp4", "sniff_mp4"), _lazy("_mp4", "write_mp4"), read_animation=_lazy("_mp4", "read_mp4"),
+        read_stream=_lazy("_mp4", "read_stream"),
     ),
     _face("openface", ".csv", "action units, pose and gaze of OpenFace", "_openface"),
     _face("pyfeat", ".csv", "blendshapes or action units of py-feat", "_pyfeat"),
@@ -376,18 +385,19 @@ def probe(
 
     bap_steps: as for `fba.decode`; it only affects what counts as damage. format: as for `read`. limits: see
     `fba.Limits`. options: of the reader, for formats other than FBA. Damage in a stream is skipped and
-    listed. Raises FormatError, BitstreamError.
+    listed. Of an MP4 file, that is its stream alone. Raises FormatError, BitstreamError.
     """
     from fba.codec import StreamInfo, probe_stream
-    from fba.source import naming_file, read_whole
+    from fba.source import naming_file
 
     if isinstance(data_or_path, bytes | bytearray | memoryview):
         return probe_stream(data_or_path, bap_steps=bap_steps, limits=limits)
     reader = format_of(data_or_path, format)
-    if reader.name == "fba":
-        with naming_file(data_or_path):
-            return probe_stream(read_whole(data_or_path), bap_steps=bap_steps, limits=limits)
     _check_options(reader.name, "reading", options, reader.read_options)
+    if reader.read_stream is not None:
+        with naming_file(data_or_path):
+            data = reader.read_stream(data_or_path, limits=limits, **options)
+            return replace(probe_stream(data, bap_steps=bap_steps, limits=limits), format=reader.name)
     if "limits" in reader.read_options:
         options["limits"] = limits
     animation = reader.read(data_or_path, **options)

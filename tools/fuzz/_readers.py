@@ -22,6 +22,7 @@ import fba
 from fba.body import BodyModel
 from fba.cache import load_or_make
 from fba.capture.virtual_markers import read_mapping, write_mapping
+from fba.carriage.mp4 import read_mp4, write_mp4
 from fba.errors import FbaError, FbaWarning
 from fba.face import FaceModel
 from fba.face.gltf._storage import build
@@ -37,6 +38,7 @@ from fba.gltf import read_gltf
 from fba.live import KINDS, Capture, StreamFile, StreamRecorder
 from fba.mesh import read_mtl, read_obj, read_ply, read_vrml, read_wfm
 from fba.persona import Persona
+from fba.source import naming_file
 from tools.fuzz._outcome import ContractError, Outcome
 from tools.fuzz._small_head import small_head_obj, small_head_points, small_head_vrml
 
@@ -49,6 +51,21 @@ Shape { geometry IndexedFaceSet { coord Coordinate { point [ 3 1 2, 4 1 2, 3 2 2
 LONGEST_CAPTURE = 2.0
 """Seconds of a live capture that are received: a body takes long for each moment."""
 _CACHED = np.arange(24, dtype=np.float32).reshape(4, 6), np.arange(5, dtype=np.float32)
+
+
+def check_mp4(data: bytes, folder: Path) -> Outcome:
+    """Read an MP4 file; of every fourth one, write its stream again: the same values."""
+
+    def copy(path: Path) -> None:
+        animation = fba.read(path, format="mp4", salvage=bool(crc32(data) & 1))
+        if crc32(data) % 4 == 0:
+            with naming_file(path):
+                stream = read_mp4(data, path=path, salvage=True).stream
+                written = write_mp4(stream, fragment=1.0 if crc32(data) & 4 else None)
+            if fba.decode(read_mp4(written).stream) != animation:
+                raise ContractError("other values after writing and reading again")
+
+    return _check_file(data, folder / "input.mp4", copy)
 
 
 def check_fap(data: bytes, folder: Path) -> Outcome:

@@ -51,6 +51,12 @@ def targets() -> tuple[Target, ...]:
             "stream-bounds", "the same, with the bounds of every array access checked", _STREAM, _START_CODES,
             share=3, environment={"NUMBA_BOUNDSCHECK": "1"}, corpus="stream",
         ),
+        _reader(
+            "mp4", "MP4 files with a stream, read, written, read again", b"moov", b"moof", b"trak", b"traf",
+            b"trun", b"stz2", b"co64", b"stss", b"edts", b"elst", b"esds", b"uuid", b"udta", b"mdat", b"mp4v",
+            b"\0\0\0\0", b"\0\0\0\1", b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"\0\0\0\x08free",
+            b"\0\0\0\0free", b"\0\0\0\1mdat" + b"\xff" * 8, *_START_CODES,
+        ),
         _reader("fap", "ASCII FAPs, read, salvaged, written", b"2.1 a 25 1\n", b"2.2", *_TEXT, b"1 " * 68),
         _reader("bap", "ASCII BAPs, read, salvaged, written", b"3.1 a 25 2\n", b"3.2", *_TEXT, b"1 " * 186),
         _reader("epf", "encoder parameters", b"FBM 3\n", b"ISI 0\n", b"SKN 9\n", b"FIX", b"GDR 1\n", *_TEXT),

@@ -56,9 +56,7 @@ def fit_poses(shape: Float64, picture: Float64, trust: Float64 | None = None) ->
     rotation = np.concatenate([rows, np.cross(rows[:, 0], rows[:, 1])[:, None]], axis=1)
     scale = np.einsum("tij,tij->t", rows, both) / 2
     if not (scale > 0).all():
-        raise ModelError(
-            "the points of a frame lie all in one place, or on a line, as no face does"
-        )
+        raise ModelError("the points of a frame lie all in one place, or on a line, as no face does")
     weights = np.broadcast_to(trust, picture.shape[:2])
     shift = centre
     for _ in range(PASSES):

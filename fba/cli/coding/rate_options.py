@@ -27,7 +27,7 @@ NAMED_PARAMETERS = 3
 """Most parameters whose errors are printed."""
 
 
-def _amount_type(name: str, units: Mapping[str, float], example: str) -> TextType:
+def amount_type(name: str, units: Mapping[str, float], example: str) -> TextType:
     """Return the type of a positive number with a unit. units: their factors; "" for a missing unit."""
 
     def parse(typed: str) -> float:
@@ -53,12 +53,12 @@ def _amount_type(name: str, units: Mapping[str, float], example: str) -> TextTyp
 
 bit_rate_option = option(
     "--bitrate",
-    type=_amount_type("bit rate", BITS, "1500 or 1.5kbit/s"),
+    type=amount_type("bit rate", BITS, "1500 or 1.5kbit/s"),
     metavar="BITS",
     help="Send what loses least at this mean rate: 1500, 1500bit/s, 1.5kbit/s.",
 )
 buffer_option = option(
-    type=_amount_type("buffer", SECONDS, "0.5s"),
+    type=amount_type("buffer", SECONDS, "0.5s"),
     default=1.0,
     typed="1s",
     metavar="SECONDS",

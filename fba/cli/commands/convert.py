@@ -9,7 +9,8 @@ import click
 
 from fba.choices import BapTableOrAuto
 from fba.cli import map_options, options, step_tables, writer_options
-from fba.cli.coding.coded_streams import encode_stream
+from fba.cli.coding.coded_streams import CodedStream, encode_stream
+from fba.cli.coding.mp4_options import Mp4Options
 from fba.cli.coding.size_options import Size
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ReadFile, Reading, check_clip, has_markers, has_skeleton, read_file
@@ -18,7 +19,7 @@ from fba.cli.outputs import Output, Outputs, OutputType, display_name, find_writ
 from fba.cli.recordings.inputs import Inputs
 from fba.encoder_options import EncoderOptions
 from fba.errors import FormatError
-from fba.parameters import BapTable
+from fba.parameters import BAP_STEPS_AUTO
 from fba.source import naming_file
 
 
@@ -30,6 +31,8 @@ from fba.source import naming_file
         "fba convert talk.fba decoded.fap",
         "fba convert walk.bap walk.bvh --joints moving",
         "fba convert both.fba person.glb --model head.glb",
+        "fba convert talk.fba talk.fba.mp4 --audio voice.wav",
+        "fba convert talk.fba.mp4 back.fba",
         "fba convert walk.bvh - --to bap | less",
     ),
 )
@@ -44,15 +47,19 @@ def command(
     no_clobber: bool = options.no_clobber_option,
     maps: map_options.Maps = map_options.map_option,
     given: writer_options.WriterOptions = group(),
+    mp4: Mp4Options = group(),
     mark: bool | None = options.mark_option,
     reading: Reading = group(bap_steps=options.written_steps_option),
 ) -> None:
     """Convert a file into another format; the content of IN and the suffix of OUT say which.
 
-    - is standard input or output. A stream is written as `fba encode` does without options.
+    - is standard input or output. A stream is written as `fba encode` does without options. Into an MP4 file
+    and out of it, a stream goes as it is.
     """
     writing = find_writer(target, to)  # raises its errors before anything is read
-    read_files = [source, given.model, given.body]
+    mp4.check(writing.name)
+    audio = mp4.find_sound(source) if writing.name == "mp4" else None
+    read_files = [source, given.model, given.body, audio]
     outputs = Outputs([Output.of_format("OUT", target, writing)], read_files, no_clobber=no_clobber)
     captures = [source] if has_skeleton(source, reading.format) else []
     with_markers = has_markers(source, reading.format)
@@ -69,27 +76,36 @@ def command(
         joints = map_options.read_joints(maps, captures, reading)
     read = read_file(source, reading, rate=rate, capture={"joints": joints, "markers": places})
     about = f"{display_name(target)}: {len(read.animation)} frames, {writing.written or writing.description}"
-    if writing.name == "fba":
-        marked = mark is not False
-        if not len(read.animation):
-            raise FormatError("the file holds no frames; a stream needs one", path=source)
-        table = _write_stream(read, target, outputs, reading.bap_steps, marked=marked)
+    if writing.name not in ("fba", "mp4"):
+        outputs.write_animation(target, read.animation, writing, **extra)
+        outputs.say(about)
+        return
+    if not len(read.animation):
+        raise FormatError("the file holds no frames; a stream needs one", path=source)
+    marked = mark is not False
+    asked = None if reading.bap_steps == BAP_STEPS_AUTO else reading.bap_steps
+    kept = read.stream if rate is None and not reading.salvage else None
+    if writing.name == "mp4":
+        stream = kept or _encode(read, target, reading.bap_steps, marked=True).data
+        data, heard = mp4.write(stream, source, audio, asked, reading.limit)
+        outputs.write(target, data)
+        outputs.say(about + heard)
+    elif kept is not None and read.format.name == "mp4" and mark is None and asked in (None, read.table):
+        outputs.write(target, kept)
+        outputs.say(about)
+    else:
+        coded = _encode(read, target, reading.bap_steps, marked=marked)
+        table = coded.encoded.options.bap_steps
+        outputs.write_stream(target, coded.data, read.animation, table, coded.bap_quant, marked=marked)
         outputs.say(about)
         step_tables.remind(target, read.animation, table, marked=marked)
-        return
-    outputs.write_animation(target, read.animation, writing, **extra)
-    outputs.say(about)
 
 
-def _write_stream(
-    read: ReadFile, target: Path, outputs: Outputs, bap_steps: BapTableOrAuto, *, marked: bool
-) -> BapTable:
-    """Write the content of a file as a stream; return its table of BAP steps."""
+def _encode(read: ReadFile, target: Path, bap_steps: BapTableOrAuto, *, marked: bool) -> CodedStream:
+    """Return the content of a file as a stream."""
     animation = read.animation
     taken = Inputs(animation, None, None, (read,), animation.rate != read.rate)
     table = step_tables.table_to_write(bap_steps, made=taken.is_captured, marked=marked, read=read.table)
     step_tables.warn_of_coarse_steps(animation, table)
     with naming_file(target):
-        coded = encode_stream(animation, EncoderOptions(bap_steps=table, mark=marked), Size(), taken)
-    outputs.write_stream(target, coded.data, animation, table, coded.bap_quant, marked=marked)
-    return table
+        return encode_stream(animation, EncoderOptions(bap_steps=table, mark=marked), Size(), taken)

@@ -12,7 +12,7 @@ import click
 from fba.animation import Animation
 from fba.cli import options, step_tables, writer_options
 from fba.cli.command import Command, EachFile, as_typed, examples
-from fba.cli.inputs import Reading, input_file, read_model
+from fba.cli.inputs import Reading, input_file, read_model, read_stream
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import STANDARD, TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
 from fba.cli.printing import Progress
@@ -137,7 +137,7 @@ class _Decoding:
 
         asked = self.reading.bap_steps
         with input_file(path) as file:
-            data = file.read_bytes()
+            data = read_stream(file, self.reading)
         writings = [target.writing for target in self.targets]
         with_body = any(each is not None and "body" in each.carries for each in writings)
         table = step_tables.table_to_read(path, data, asked, self.reading.limit, shown=with_body)
@@ -187,7 +187,7 @@ class _Decoding:
 def command(
     inputs: tuple[Path, ...],
     writing: _Writing,
-    reading: Reading = group("bap_steps", "salvage", "limit"),
+    reading: Reading = group("bap_steps", "salvage", "limit", "track"),
     as_json: bool = options.json_option,
 ) -> None:
     """Decode FBA streams: to ASCII FAP and BAP files, to EPF files with the settings of their planes, and to

@@ -21,7 +21,7 @@ from fba.cli.scenes import MOST_FILES, SoundOptions
 from fba.encoder_options import EncoderOptions
 from fba.errors import FormatError
 from fba.limits import Limits
-from fba.source import naming_file, read_whole
+from fba.source import naming_file
 
 if TYPE_CHECKING:
     from fba_player.export.page import PageStream
@@ -81,7 +81,8 @@ def command(
         audio=option(
             type=options.FILE,
             metavar="FILE",
-            help="Sound, from the first frame. Default: the WAV file of the same name beside the input.",
+            help="Sound, from the first frame. Default: that of an MP4 file, else the WAV file of the same "
+            "name beside the input.",
         )
     ),
     reading: Reading = group(),
@@ -121,7 +122,7 @@ def command(
         with_body=any(each.animation.body is not None for each in read),
         with_head=any(each.animation.body is None for each in read),
         audio=audio,
-        audio_offset=sound.audio_offset,
+        audio_offset=scenes.find_offset(audio, files, sound),
         title=look.title,
         view=look.view or "",
         loop=look.loop,
@@ -148,8 +149,8 @@ def _stream(read: ReadFile, name: str) -> PageStream:
     """Return what goes into the page for a file."""
     from fba_player.export.page import PageStream
 
-    if read.format.name == "fba" and str(read.path) != "-":
-        return PageStream(name, read_whole(read.path), read.table)
+    if read.stream is not None:
+        return PageStream(name, read.stream, read.table)
     animation = read.animation
     taken = Inputs(animation, None, None, (read,), False)
     with naming_file(read.path):

@@ -11,16 +11,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fba.choices import BapTableOrAuto
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import Reading, check_clip, find_format, input_file, probe_input, taken_options
+from fba.cli.inputs import (
+    Reading,
+    check_clip,
+    find_format,
+    input_file,
+    probe_input,
+    read_stream,
+    taken_options,
+)
 from fba.cli.option_fields import option, with_options
 from fba.cli.printing import clock_text, print_json, rate_text, seconds_text
 from fba.errors import FbaWarning, ModelError
 from fba.parameters import BAP_STEPS_AUTO
 
 if TYPE_CHECKING:
+    from fba.carriage.mp4 import Mp4Track
     from fba.codec import PartInfo, StreamInfo
     from fba.formats import Format
     from fba.formats.gltf.bodies import PersonInfo
@@ -61,7 +69,7 @@ def command(
     if trace:
         for path in files:
             with each.file(path):
-                _trace(path, bap_steps=reading.bap_steps, as_json=as_json, values=values)
+                _trace(path, reading, as_json=as_json, values=values)
         each.finish()
         return
     reports = []
@@ -78,6 +86,7 @@ def _report(path: Path, file: Path, reading: Reading, face: str | None, *, print
 
     path: as typed. file: to be read. face: the name of the captured face to read.
     """
+    from fba.carriage.mp4 import list_tracks
     from fba.codec import StreamInfo
 
     reader, size = find_format(file, reading.format), file.stat().st_size
@@ -97,14 +106,17 @@ def _report(path: Path, file: Path, reading: Reading, face: str | None, *, print
         assert content.animation is not None  # as there is no person
         info, clips = StreamInfo.of_animation(content.animation, reader.name, size), content.clips
     steps = ""
-    if info.format == "fba" and info.body is not None:
-        data = file.read_bytes()
+    if reader.read_stream is not None and info.body is not None:
+        data = read_stream(file, reading, reader)
         steps = step_tables.explain_choice(data, reading.bap_steps, reading.limit)
         if reading.bap_steps != BAP_STEPS_AUTO:
             step_tables.warn_of_doubtful_stream(path, data, reading.bap_steps)
+    tracks = list_tracks(file.read_bytes(), file) if reader.name == "mp4" else ()
     if printed:
-        _print(path, info, clips, steps)
+        _print(path, info, clips, steps, tracks, size)
     report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None}
+    if tracks:
+        report |= {"file_size": size, "tracks": [each.to_dict() for each in tracks]}
     return report | ({"clips": [asdict(clip) for clip in clips]} if clips else {})
 
 
@@ -142,15 +154,17 @@ def _report_face(
     return {"file": str(path), **info.to_dict(), "bap_steps_choice": None, "capture": capture}
 
 
-def _trace(path: Path, *, bap_steps: BapTableOrAuto, as_json: bool, values: bool) -> None:
+def _trace(path: Path, reading: Reading, *, as_json: bool, values: bool) -> None:
     import json
 
     from fba_conformance.listing import element_dict, format_trace
     from fba_conformance.trace import trace
 
     with input_file(path) as file:
-        data = file.read_bytes()
-        elements = trace(data, bap_steps=step_tables.table_to_read(path, data, bap_steps, shown=values))
+        data = read_stream(file, reading)
+        elements = trace(
+            data, bap_steps=step_tables.table_to_read(path, data, reading.bap_steps, shown=values)
+        )
     if as_json:
         for element in elements:
             click.echo(json.dumps(element_dict(element)))
@@ -193,8 +207,19 @@ def _print_markers(capture: Mapping[str, Any]) -> None:
     )
 
 
-def _print(path: Path, info: StreamInfo, clips: tuple[ClipInfo, ...], steps: str) -> None:
-    click.echo(f"{path}: {info.format.upper()}, {info.size} bytes")
+def _print(
+    path: Path,
+    info: StreamInfo,
+    clips: tuple[ClipInfo, ...],
+    steps: str,
+    tracks: tuple[Mp4Track, ...] = (),
+    size: int = 0,
+) -> None:
+    """Print a description. tracks: of an MP4 file of that size, in bytes."""
+    click.echo(f"{path}: {info.format.upper()}, {size or info.size} bytes")
+    for number, track in enumerate(tracks):
+        about = f", the stream of {info.size} bytes" if track.is_fba else ""
+        click.echo(f"  {'' if number else 'tracks':8} {track}{about}")
     skipped = f", {info.skipped} skipped" if info.skipped else ""
     start = f", starts at {seconds_text(info.start)}" if info.start else ""
     click.echo(

@@ -133,7 +133,7 @@ def _play(
             camera=how.camera,
             start=start,
             audio=audio,
-            audio_offset=sound.audio_offset,
+            audio_offset=scenes.find_offset(audio, files, sound),
             file=files[0] if single else None,
             bap_steps=tables[0] if tables else BAP_STEPS_DEFAULT,
             warnings=tuple(doubts),

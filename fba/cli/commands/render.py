@@ -99,8 +99,8 @@ class _Request:
         audio=option(
             type=options.FILE,
             metavar="FILE",
-            help="Sound of an MP4, from the first frame. Default: the WAV file of the same name beside the "
-            "input.",
+            help="Sound of an MP4, from the first frame. Default: that of an MP4 file, else the WAV file of "
+            "the same name beside the input.",
         )
     )
     how: SceneOptions
@@ -227,7 +227,7 @@ def _picture(scene: Showable, output: str, request: _Request, audio: Path | None
             camera=request.how.camera,
             **asdict(request.moment),
             audio=audio,
-            audio_offset=request.sound.audio_offset,
+            audio_offset=scenes.find_offset(audio, request.files, request.sound),
             transparent=request.transparent,
             replace=request.writing.replace,
             progress=step.show,

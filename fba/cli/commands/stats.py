@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import Reading, input_file
+from fba.cli.inputs import Reading, input_file, read_stream
 from fba.cli.option_fields import group, with_options
 from fba.cli.printing import print_json, print_table
 from fba.parameters import BAP_STEPS_AUTO
@@ -28,7 +28,7 @@ COLUMNS = (
 @with_options
 def command(
     files: tuple[Path, ...],
-    reading: Reading = group("bap_steps", "limit"),
+    reading: Reading = group("bap_steps", "limit", "track"),
     as_json: bool = options.json_option,
 ) -> None:
     """Show where the bits of FBA streams go: I and P planes, mean and peak rates."""
@@ -38,7 +38,7 @@ def command(
     each = EachFile(files)
     for path in files:
         with each.file(path), input_file(path) as file:
-            data = file.read_bytes()
+            data = read_stream(file, reading)
             info = probe_stream(data, limits=reading.limit)
             if info.body is not None and reading.bap_steps != BAP_STEPS_AUTO:
                 step_tables.warn_of_doubtful_stream(path, data, reading.bap_steps)

@@ -10,7 +10,7 @@ import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import Command, EachFile, examples
-from fba.cli.inputs import Reading, input_file
+from fba.cli.inputs import Reading, input_file, read_stream
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.printing import Progress, print_json, print_table
 from fba.errors import FormatError
@@ -36,7 +36,7 @@ def command(
         metavar="REPORT.json",
         help="Also compare the digests with those of an earlier --json report.",
     ),
-    reading: Reading = group("bap_steps", "limit"),
+    reading: Reading = group("bap_steps", "limit", "track"),
     as_json: bool = options.json_option,
 ) -> None:
     """Check FBA streams: end code, damage, frames lost and in doubt, and a digest of the decoded values.
@@ -52,7 +52,7 @@ def command(
     with Progress("checking", len(files)) as step:
         for path in files:
             with each.file(path), input_file(path) as file:
-                data = file.read_bytes()
+                data = read_stream(file, reading)
                 table = step_tables.table_to_read(path, data, reading.bap_steps, reading.limit)
                 verification = verify_stream(data, bap_steps=table, limits=reading.limit)
                 report = {"file": str(path), **verification.to_dict()}

@@ -16,9 +16,11 @@ from typing import Any
 from fba.animation import Animation
 from fba.atomic import PathLike
 from fba.body import BodyModel
+from fba.carriage.mp4 import write_sound
 from fba.errors import FormatError
 from fba.face import FaceModel
 from fba.parameters import BapTable
+from fba_player.sound.coded_sound import read_coded_sound
 from fba_player.web import pack_body, pack_face
 
 SOUND_TYPES = {
@@ -26,6 +28,8 @@ SOUND_TYPES = {
     ".opus": "audio/ogg", ".oga": "audio/ogg", ".flac": "audio/flac", ".webm": "audio/webm",
 }  # fmt: skip
 """Media types of sounds that browsers play, by suffix."""
+FILMS = (".mp4", ".m4v", ".mov")
+"""Suffixes of files of which the sound alone goes into a page."""
 MOST_SOUND_BYTES = 64_000_000
 """Largest sound that goes into a page."""
 BUNDLE = "dist/fba-player.min.js"
@@ -150,20 +154,28 @@ def _encoded(data: bytes) -> str:
     return base64.b64encode(data).decode()
 
 
+def _check_size(path: Path, size: int) -> None:
+    """Raise FormatError for a sound of too many bytes."""
+    if size > MOST_SOUND_BYTES:
+        raise FormatError(
+            f"has {size:,} bytes of sound, more than the {MOST_SOUND_BYTES:,} that a page may hold; "
+            "convert it to MP3 or Opus, or cut it",
+            path=path,
+        )
+
+
 def _sound(path: Path) -> str:
     """Return the data URI of a sound."""
     media = SOUND_TYPES.get(path.suffix.lower())
+    if path.suffix.lower() in FILMS:
+        data = write_sound(read_coded_sound(path))
+        _check_size(path, len(data))
+        return f"data:audio/mp4;base64,{_encoded(data)}"
     if media is None:
         known = ", ".join(SOUND_TYPES)
         raise FormatError(f"is no sound that browsers play; expected one of {known}", path=path)
     try:
-        size = path.stat().st_size
-        if size > MOST_SOUND_BYTES:
-            raise FormatError(
-                f"has {size:,} bytes, more than the {MOST_SOUND_BYTES:,} that a page may hold; "
-                "convert it to MP3 or Opus, or cut it",
-                path=path,
-            )
+        _check_size(path, path.stat().st_size)
         return f"data:{media};base64,{_encoded(path.read_bytes())}"
     except OSError as error:
         raise FormatError(f"cannot be read: {error.strerror}", path=path) from error

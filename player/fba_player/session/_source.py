@@ -119,11 +119,12 @@ class Source:
         from fba.formats import format_of, probe
 
         try:
-            name = format_of(self.path).name if self.path is not None else ""
-            if self.path is not None and name == "fba":
+            found = format_of(self.path) if self.path is not None else None
+            if self.path is not None and found is not None and found.read_stream is not None:
                 self._probed = probe(self.path, bap_steps=self.bap_steps)
-            elif self.path is not None:  # described by the animation, whose rate the user may have set
-                self._format_and_size = (name, os.stat(self.path).st_size)
+            elif self.path is not None and found is not None:
+                # described by the animation, whose rate the user may have set
+                self._format_and_size = (found.name, os.stat(self.path).st_size)
                 self._scene_info = None
         except (FbaError, OSError) as error:
             self.warnings.append(f"the planes of the file cannot be read: {error}")

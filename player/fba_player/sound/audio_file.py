@@ -57,7 +57,8 @@ class SoundFile(Closing):
 
     path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rates: samples per second that need no
     resampling; by default those that devices play. rate: that of the samples. duration: seconds as stated in
-    the file; None where it does not say. Mono goes to both sides; more than two channels are mixed down.
+    the file; None where it does not say. mono: whether there is one channel, which goes to both sides. More
+    than two channels are mixed down. start: seconds at which the file presents the first sample.
 
     Use it from one thread at a time. Raises FormatError where it cannot be read or holds no sound.
     """
@@ -76,6 +77,8 @@ class SoundFile(Closing):
         if length is None or not seconds:
             length, seconds = self._container.duration, Fraction(1, av.time_base)
         self.duration = None if length is None else max(float(length * seconds), 0.0)
+        self.mono = self._stream.channels == 1
+        self.start = float((self._stream.start_time or 0) * (self._stream.time_base or 0))
         self._first = 0  # sample that the first part since the last seek begins with
         self._parts: Iterator[Int16] = iter(())
         self._next: int | None = None  # sample that the next part begins with

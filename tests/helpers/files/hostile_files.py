@@ -20,6 +20,7 @@ import numpy as np
 
 from format_files import mask
 from gltf_documents import Sheet
+from mp4_files import Track, box, fragmented_file, numbers, whole_file
 
 JOINTS = {
     "Spine": ("Hips", (0, 1, 0)),
@@ -423,6 +424,7 @@ def hostile_files() -> dict[str, HostileFile]:
         **_meshes(),
         **_points(),
         **_sounds(),
+        **_films(),
         **_personas(),
     }
 
@@ -693,6 +695,39 @@ def _points() -> dict[str, HostileFile]:
             load_definition, "a.json", repeat('{"joints": {"', "a", '": {"centre": 0}}}')
         ),
     }
+
+
+def _films() -> dict[str, HostileFile]:
+    plane = b"\0\0\1\xbb\xff"
+    return {
+        "mp4 samples": HostileFile(
+            read_any, "a.mp4", lambda size: whole_file(Track([plane] * (size // 30), chunks=(1,)))
+        ),
+        "mp4 equal samples": HostileFile(read_any, "a.mp4", equal_samples),
+        "mp4 fragments": HostileFile(
+            read_any,
+            "a.mp4",
+            lambda size: fragmented_file(Track([plane] * (size // 120)), range(1, size // 120)),
+        ),
+        "mp4 boxes": HostileFile(
+            read_any, "a.mp4", lambda size: whole_file(Track([plane]), padding=box(b"free") * (size // 8))
+        ),
+        "mp4 tracks": HostileFile(
+            read_any,
+            "a.mp4",
+            lambda size: whole_file(*(Track([plane], number=n) for n in range(size // 560))),
+        ),
+    }
+
+
+def equal_samples(size: int) -> bytes:
+    """An MP4 file of samples of a byte, whose sizes take no room."""
+    count = size // 2
+    data = whole_file(Track([b"x" * count], chunks=(1,)))
+    for kind, offset, values in ((b"stsz", 8, (1, count)), (b"stts", 12, (count,)), (b"stsc", 16, (count,))):
+        at = data.index(kind) + offset
+        data = data[:at] + numbers(*values) + data[at + 4 * len(values) :]
+    return data
 
 
 def _sounds() -> dict[str, HostileFile]:

@@ -11,13 +11,12 @@ import click
 
 from fba.cli import options, step_tables
 from fba.cli.command import STANDARD_INPUT, Command, examples
-from fba.cli.inputs import Reading, find_format, read_file
+from fba.cli.inputs import Reading, find_format, read_file, read_stream
 from fba.cli.interruptions import raise_delayed, stopping
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.web_server import HOST_HELP, INTRA_PERIOD, open_server
 from fba.encoder_options import EncoderOptions
 from fba.parameters import BAP_STEPS_AUTO
-from fba.source import read_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,7 +41,7 @@ def command(
     host: str | None = option(metavar="ADDRESS", help=HOST_HELP),
     loop: bool = option(default=False, help="Files start again at the end."),
     viewers: int = option(default=200, type=click.IntRange(1, 10_000), help="Most viewers at once."),
-    reading: Reading = group("format", "source_rate", "clip", "bap_steps", "limit"),
+    reading: Reading = group("format", "source_rate", "clip", "bap_steps", "limit", "track"),
 ) -> None:
     """Show files, or a stream while it arrives, in browsers: open the address that is printed.
 
@@ -80,8 +79,9 @@ def _read(file: Path, reading: Reading) -> tuple[list[Plane], bytes]:
     from fba.serving import split_stream
 
     limits = reading.limit
-    if find_format(file, reading.format).name == "fba":
-        data = read_whole(file)
+    reader = find_format(file, reading.format)
+    if reader.read_stream is not None:
+        data = read_stream(file, reading, reader)
         return split_stream(data, step_tables.table_to_read(file, data, reading.bap_steps, limits), limits)
     animation = read_file(file, reading).animation
     options = EncoderOptions(clamp=True, bap_steps="visage", start_codes=True, intra_period=INTRA_PERIOD)
