@@ -36,6 +36,8 @@ fba.codec.settings
 fba.codec._plane
 fba.codec._stream
 fba.codec
+fba.serving
+fba.carriage
 fba.face.interpolation
 fba.face
 fba.face.deform
@@ -84,7 +86,6 @@ fba.formats.gltf
 fba.formats.face_tables
 fba.live._protocols
 fba.live
-fba.serving
 fba.persona.points
 fba.persona.recognition
 fba.persona

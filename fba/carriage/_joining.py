@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from fractions import Fraction
 
+from fba.carriage.counts import Counts
 from fba.carriage.payloads import Unit, full_configuration
 from fba.codec import Decoder, marked_table, read_plane_start, replace_time_code, time_code
-from fba.errors import BitstreamError, FbaError
+from fba.errors import BitstreamError, FbaError, FbaWarning
 from fba.parameters import BapTable
 
 PATIENCE = Fraction(2)
@@ -21,10 +23,10 @@ _PLANE = b"\0\0\1\xbb"
 class StreamJoiner:
     """Joins planes to a stream that a decoder reads without an error.
 
-    Every plane is decoded, so that one that cannot be counts as lost. Behind a loss, planes are held back until one with which decoding may begin. Its time code is set to the
-    time of the sender's clock, so that the stream shows the pose before the loss until then. Time codes are
-    whole seconds: a plane between them goes on only after `PATIENCE`, and directly behind the plane before
-    the loss.
+    Every plane is decoded, so that one that cannot be counts as lost. Behind a loss, planes are held back
+    until one with which decoding may begin. Its time code is set to the time of the sender's clock, so that
+    the stream shows the pose before the loss until then. Time codes are whole seconds: a plane between them
+    goes on only after `PATIENCE`, and directly behind the plane before the loss.
 
     configuration: headers known beforehand. planes: passed on. held: held back. damaged: that were no planes.
     gaps: losses that are over. longest_gap: seconds. slipped: seconds by which times are early. table: of BAP
@@ -42,6 +44,7 @@ class StreamJoiner:
         self._waiting = True  # for a plane to begin at
         self._rate = _DEFAULT_RATE
         self._offset = Fraction(0)  # seconds of the stream at the sender's 0
+        self._start = Fraction(0)  # seconds of the stream at which it begins
         self._following = Fraction(0)  # seconds of the stream at which the next plane is due
         self._lost_at = Fraction(0)  # sender's time of the first plane that was held back
         self._last = Fraction(0)  # sender's time of the last plane
@@ -49,15 +52,18 @@ class StreamJoiner:
         self._decoder = Decoder()
         self._read = 0  # bytes that it got
 
-    @property
-    def waiting(self) -> bool:
-        """Whether planes are held back."""
-        return self._waiting
-
     def lose(self) -> None:
         """Say that planes before the next one are lost."""
         if not self._waiting:
             self._waiting, self._lost_at = True, self._last
+
+    def fill_in(self, counts: Counts) -> None:
+        """Write what was counted here."""
+        counts.planes, counts.held, counts.damaged, counts.gaps = (
+            self.planes, self.held, self.damaged, self.gaps
+        )  # fmt: skip
+        counts.longest_gap, counts.slipped = float(self.longest_gap), float(self.slipped)
+        counts.seconds = float(self._following - self._start)
 
     def begin_anew(self) -> None:
         """Say that the next planes are of another sender: they begin another object."""
@@ -97,7 +103,8 @@ class StreamJoiner:
                 self.held += 1
                 return b""
             if not self.planes:
-                self._offset = (0 if code is None else code.total_seconds) - time
+                self._start = Fraction(0 if code is None else code.total_seconds)
+                self._offset = self._start - time
         if self.planes and start.intra and (self._waiting or code is not None):
             named = time_code(_nearest(time + self._offset, rate), rate)
             if named != code:
@@ -135,7 +142,9 @@ class StreamJoiner:
             headers = _PLANE
         self._read += len(headers) + len(data)
         try:
-            blocks = self._decoder.push_blocks(headers + data)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", FbaWarning)  # who decodes the stream gives them
+                blocks = self._decoder.push_blocks(headers + data)
         except FbaError:
             return False
         stops = [int(block.borders[-1]) for block in blocks]

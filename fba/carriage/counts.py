@@ -14,12 +14,12 @@ MOST_REASONS = 20
 class Counts:
     """Counts of packets and planes.
 
-    packets, bytes: that came. refused: packets that are none of this stream, by reason. other_senders: packets
-    of other senders than the first. lost, late, doubled, reordered: packets, by their numbers. senders: that
-    followed each other. planes: passed on. held: planes that came behind a loss and were left out. damaged:
-    planes that could not be decoded, left out. gaps: times that the pose was held because planes were missing.
-    longest_gap: seconds. slipped: seconds that the stream is shorter by, since no time code could say how
-    long the pose was held.
+    packets, bytes: that came. refused: packets that are none of this stream, by reason. other_senders:
+    packets of other senders than the first. lost, late, doubled, reordered: packets, by their numbers.
+    senders: that followed each other. planes: passed on. held: planes that came behind a loss and were left
+    out. damaged: planes that could not be decoded, left out. gaps: times that the pose was held because
+    planes were missing. longest_gap: seconds. slipped: seconds that the stream is shorter by, since no time
+    code could say how long the pose was held. seconds: of the stream.
     """
 
     packets: int = 0
@@ -37,6 +37,7 @@ class Counts:
     gaps: int = 0
     longest_gap: float = 0.0
     slipped: float = 0.0
+    seconds: float = 0.0
 
     def refuse(self, reason: str) -> None:
         """Count a packet that is left out."""

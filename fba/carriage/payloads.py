@@ -177,7 +177,7 @@ class PayloadReader:
 
     def _join(self, part: bytes, size: int, joinable: bool | None) -> list[Unit]:
         """Return the unit of which this is the last part; none while more are to come."""
-        if self._part and self._size != size or not part:
+        if (self._part and self._size != size) or not part:
             raise FormatError("of parts of a plane that do not fit together")
         self._part, self._size = self._part + part, size
         if len(self._part) < size:

@@ -1,4 +1,4 @@
-"""`RtpReader` and `DatagramReader`: packets that arrive to an FBA stream, which grows without an error in it."""
+"""`RtpReader` and `DatagramReader`: packets that arrive to an FBA stream without errors."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ SILENCE = 1.0
 """Seconds without a packet after which another sender may take the place of the first."""
 DELAY = 0.1
 """Seconds that packets wait for an earlier one, by default."""
+_OF_ORDER = ("lost", "late", "doubled", "reordered")
+"""Counts that a `PacketOrder` has."""
 _NUMBERS, _TICKS = 1 << 16, 1 << 32
 
 
@@ -126,12 +128,9 @@ class RtpReader:
     def settle(self, now: float) -> list[bytes]:
         """See `PacketReader`."""
         parts = [part for packet, lost in self._order.take(now) for part in self._read(packet, lost)]
-        counts, joiner = self.counts, self._joiner
-        for name in ("lost", "late", "doubled", "reordered"):
-            setattr(counts, name, getattr(self._done, name) + getattr(self._order, name))
-        for name in ("planes", "held", "damaged", "gaps"):
-            setattr(counts, name, getattr(joiner, name))
-        counts.longest_gap, counts.slipped = float(joiner.longest_gap), float(joiner.slipped)
+        for name in _OF_ORDER:
+            setattr(self.counts, name, getattr(self._done, name) + getattr(self._order, name))
+        self._joiner.fill_in(self.counts)
         return parts
 
     def _follows(self, packet: RtpPacket, address: Hashable, now: float) -> bool:
@@ -157,7 +156,7 @@ class RtpReader:
 
     def _begin_anew(self, now: float) -> None:
         """Let another sender follow; the seconds between them are those of our clock."""
-        for name in ("lost", "late", "doubled", "reordered"):
+        for name in _OF_ORDER:
             setattr(self._done, name, getattr(self.counts, name))
         self._base = self._time() + Fraction(max(now - self._heard, 0.0))
         self._ticks = None
@@ -236,8 +235,7 @@ class DatagramReader:
             self._sender = sender
         self._heard = now
         parts = [part for unit in units if (part := joiner.add(unit, None))]
-        for name in ("planes", "held", "damaged", "gaps"):
-            setattr(counts, name, getattr(joiner, name))
+        joiner.fill_in(counts)
         return parts
 
     def settle(self, now: float) -> list[bytes]:

@@ -39,7 +39,7 @@ class Session:
 
 
 def write_sdp(session: Session) -> str:
-    """Return the description of a session. session.host: an address, not a name. Raises ValueError for a name."""
+    """Return the description of a session, whose host is an address. Raises ValueError for a name."""
     address = ipaddress.ip_address(session.host)
     where = f"IN IP{address.version} {address}"
     limited = "/1" if address.is_multicast and address.version == 4 else ""
@@ -163,7 +163,10 @@ class _Reader:
         if kind == "3640" and parameters.get("streamtype", "4") != "4":
             _refuse("streamType", parameters["streamtype"], "4, a visual stream", line)
         configuration = parameters.get("config", "")
-        if not re.fullmatch(r"(?:[0-9a-fA-F]{2})*", configuration) or len(configuration) > 2 * MOST_CONFIGURATION:
+        if (
+            not re.fullmatch(r"(?:[0-9a-fA-F]{2})*", configuration)
+            or len(configuration) > 2 * MOST_CONFIGURATION
+        ):
             _refuse("config", configuration, "bytes in hexadecimal", line)
         return Session(
             host, media.port, kind, number, bytes.fromhex(configuration), _table(parameters, kind, line),

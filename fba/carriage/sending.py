@@ -21,8 +21,8 @@ MOST_PAYLOAD = 1400
 """Bytes of a payload, for which every network has room; a longer plane is spread over packets."""
 MOST_PLANES = 100
 """Planes in a packet."""
-_END_COPIES = 3
-"""Packets that say that the stream has ended, since any may be lost."""
+END_COPIES = 3
+"""Packets that say that the stream has ended, where any may be lost."""
 
 
 class PacketWriter(Protocol):
@@ -50,7 +50,7 @@ class RtpWriter:
 
     kind: "3640" or "6416", the RFC of the payload. planes_per_packet: all but the last of them wait for it. A
     plane at which decoding may begin also begins a packet. ssrc, sequence, timestamp: of the first packet;
-    they should be random.
+    they should be random. end_copies: packets that say that the stream has ended.
     """
 
     def __init__(
@@ -62,12 +62,14 @@ class RtpWriter:
         ssrc: int,
         sequence: int,
         timestamp: int,
+        end_copies: int = END_COPIES,
     ) -> None:
         if not 1 <= planes_per_packet <= MOST_PLANES:
             raise ValueError(f"planes_per_packet must be 1 to {MOST_PLANES}, not {planes_per_packet}")
         self._write = write_size_table if kind == "3640" else write_start_codes
         self._most = planes_per_packet
         self._first = RtpPacket(payload_type, sequence, timestamp, ssrc, True, b"")
+        self._end_copies = end_copies
         self._sent = 0
         self._waiting: list[Unit] = []
         self._time = 0.0  # of the first of them
@@ -89,7 +91,7 @@ class RtpWriter:
     def finish(self) -> list[bytes]:
         """See `PacketWriter`."""
         packets = self._flush() if self._waiting else []
-        return packets + [self._packet(self._write([Unit(b"")])) for _ in range(_END_COPIES)]
+        return packets + [self._packet(self._write([Unit(b"")])) for _ in range(self._end_copies)]
 
     def _flush(self) -> list[bytes]:
         payload = self._write(self._waiting)
@@ -135,7 +137,7 @@ class DatagramWriter:
 
     def finish(self) -> list[bytes]:
         """See `PacketWriter`."""
-        return [*(self._flush() if self._waiting else []), *[END_CODE] * _END_COPIES]
+        return [*(self._flush() if self._waiting else []), *[END_CODE] * END_COPIES]
 
     def _flush(self) -> list[bytes]:
         content, self._waiting, self._planes = self._waiting, b"", 0

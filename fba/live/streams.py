@@ -10,14 +10,14 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from fba.carriage.counts import Counts
 from fba.carriage.payloads import PayloadKind
 from fba.carriage.receiving import DELAY, DatagramReader, PacketReader, RtpReader
 from fba.carriage.rtp import FrameReader, write_frame
 from fba.carriage.sdp import Session
-from fba.carriage.sending import DatagramWriter, PacketWriter, RtpWriter
+from fba.carriage.sending import END_COPIES, DatagramWriter, PacketWriter, RtpWriter
 from fba.errors import FbaError
 from fba.live.addresses import StreamAddress
 from fba.live.receiver import MAX_DATAGRAM, open_udp
@@ -37,8 +37,8 @@ PATIENCE = 10.0
 class StreamSender:
     """Sends planes to an address; a context manager.
 
-    kind, planes_per_packet: as of `RtpWriter`. Over TCP, packets are those of RTP, each behind its length (RFC
-    4571); over UDP without RTP, those of `DatagramWriter`.
+    kind, planes_per_packet: as of `RtpWriter`. Over TCP, packets are those of RTP, each behind its length
+    (RFC 4571); over UDP without RTP, those of `DatagramWriter`.
 
     Raises FbaError for an address that cannot be reached.
     """
@@ -55,8 +55,10 @@ class StreamSender:
             self._writer = RtpWriter(
                 kind=kind, planes_per_packet=planes_per_packet, ssrc=secrets.randbits(32),
                 sequence=secrets.randbits(16), timestamp=secrets.randbits(32),
+                end_copies=1 if address.scheme == "tcp" else END_COPIES,
             )  # fmt: skip
         self._socket: socket.socket
+        self._target: Any = None
 
     def __enter__(self) -> Self:
         host, port = self.address.host or "localhost", self.address.port
