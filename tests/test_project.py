@@ -171,6 +171,7 @@ def test_rooms_are_imported_where_they_are_first_used() -> None:
     )
     rooms = {path.parent.name for path in (ROOT / "fba").glob("*/__init__.py")}
     assert rooms - {name.removeprefix("fba.") for name in listed.stdout.split()} == {
+        "carriage",
         "cli",
         "gltf",
         "mesh",

@@ -52,6 +52,11 @@ class StreamJoiner:
         self._decoder = Decoder()
         self._read = 0  # bytes that it got
 
+    @property
+    def holding(self) -> bool:
+        """Whether the pose is held since planes were lost."""
+        return self._waiting and self.planes > 0
+
     def lose(self) -> None:
         """Say that planes before the next one are lost."""
         if not self._waiting:

@@ -197,7 +197,7 @@ def split_start_codes(data: bytes) -> list[Unit]:
     places = _code_places(data)
     units: list[Unit] = []
     configured = 0  # begin of the headers before the next plane
-    for place, stop in zip(places, [*places[1:], len(data)], strict=True):
+    for place, stop in zip(places, [*places[1:], len(data)][: len(places)], strict=True):
         code = data[place : place + 4]
         if code in _PLANE_CODES or (code in _OBJECT_CODES and place + 4 < stop):
             behind = data[configured : place + (4 if code in _OBJECT_CODES else 0)]

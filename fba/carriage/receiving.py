@@ -37,6 +37,10 @@ class PacketReader(Protocol):
         """Whether the end of the stream came."""
 
     @property
+    def holding(self) -> bool:
+        """Whether the pose is held, since planes are missing."""
+
+    @property
     def due(self) -> float | None:
         """Time at which `settle` has something to return, if no packet comes before; None without."""
 
@@ -99,6 +103,11 @@ class RtpReader:
     def ended(self) -> bool:
         """See `PacketReader`."""
         return self._joiner.ended
+
+    @property
+    def holding(self) -> bool:
+        """See `PacketReader`."""
+        return self._joiner.holding
 
     @property
     def due(self) -> float | None:
@@ -212,6 +221,11 @@ class DatagramReader:
     def ended(self) -> bool:
         """See `PacketReader`."""
         return self._joiner.ended
+
+    @property
+    def holding(self) -> bool:
+        """See `PacketReader`."""
+        return self._joiner.holding
 
     def receive(self, data: bytes, sender: Hashable, now: float) -> list[bytes]:
         """See `PacketReader`."""

@@ -25,6 +25,10 @@ END_COPIES = 3
 """Packets that say that the stream has ended, where any may be lost."""
 
 
+_TABLE_BYTES = 5
+"""Bytes before a single plane by RFC 3640: the length of its AU header, 16 bits, and the header, 17."""
+
+
 class PacketWriter(Protocol):
     """Makes packets of planes."""
 
@@ -98,7 +102,8 @@ class RtpWriter:
         self._waiting = []
         if len(payload) <= MOST_PAYLOAD:
             return [self._packet(payload)]
-        header = payload[:4] if self._write is write_size_table else b""  # of a single plane: the same in all
+        table = _TABLE_BYTES if self._write is write_size_table else 0
+        header = payload[:table]  # of a single plane: the same in all parts
         content, size = payload[len(header) :], MOST_PAYLOAD - len(header)
         parts = [content[begin : begin + size] for begin in range(0, len(content), size)]
         return [

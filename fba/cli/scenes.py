@@ -142,7 +142,9 @@ def open_file(
         from fba_player.playback.live import LiveAnimation
 
         receiver = live_streams.opened(file, receiving, stack)
-        return _arrived(LiveAnimation(receiver, name=str(receiver.address), bap_steps=how.bap_steps))
+        live = LiveAnimation(receiver, name=str(receiver.address), bap_steps=how.bap_steps)
+        receiver.say = live.tell
+        return _arrived(live)
     if str(file) == "-" and sys.stdin.isatty():
         raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):

@@ -146,7 +146,8 @@ class StreamReceiver:
     """Receives a stream at an address of this computer; a context manager.
 
     source: an address, or a session by its description. delay: seconds that a packet waits for one before it.
-    wait: seconds within which the stream must begin. clock: monotonic, in seconds.
+    wait: seconds within which the stream must begin. clock: monotonic, in seconds. say: called with a few words
+    when planes are missing, and when it goes on; it may be set later.
 
     Raises FbaError, on entering, where the port cannot be opened, and from `read1` where no stream comes.
     """
@@ -175,6 +176,8 @@ class StreamReceiver:
         self._ended = False
         self._sockets: dict[socket.socket, FrameReader | None] = {}
         self._followed: socket.socket | None = None  # the connection that sends planes
+        self._holding = False
+        self.say: Callable[[str], None] = lambda _text: None
 
     @property
     def counts(self) -> Counts:
@@ -225,11 +228,22 @@ class StreamReceiver:
                 if not self.counts.planes and self._wait is not None and now - self._begun >= self._wait:
                     raise FbaError(self.nothing())
                 parts = self._receive(self._patience(now))
+            self._tell()
             if parts:
                 return b"".join(parts)
             if self._ended or self._reader.ended:
                 break
         return b""
+
+    def _tell(self) -> None:
+        """Say that the pose is held, or no longer."""
+        if self._reader.holding == self._holding:
+            return
+        self._holding = self._reader.holding
+        counts = self.counts
+        lost = f"{counts.lost} packets lost" if counts.lost else "the stream broke off"
+        times = "" if self._holding else f" {counts.gaps} times so far" if counts.gaps > 1 else " once so far"
+        self.say(f"{lost}: the pose {'is' if self._holding else 'was'} held{times}")
 
     def nothing(self) -> str:
         """Return the reason why there is no stream."""

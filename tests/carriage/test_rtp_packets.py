@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 
 import pytest
@@ -101,10 +102,8 @@ def test_a_plane_that_no_packet_has_room_for_is_spread(kind: str) -> None:
             if number == missing:
                 reader.lose()
                 continue
-            try:
+            with contextlib.suppress(FormatError):
                 found += reader.push(one.payload, marker=one.marker)
-            except FormatError:
-                pass
         assert not [one for one in found if one.data == unit]
 
 
@@ -145,12 +144,10 @@ def test_payloads_that_lie(payload: bytes) -> None:
 
 
 def test_parts_do_not_grow_for_ever() -> None:
-    reader = PayloadReader("6416")
-    with pytest.raises(FormatError, match=str(MOST_UNIT_BYTES)):
+    sized = b"\0\x11" + (8000 << 11).to_bytes(3, "big") + bytes(1000)
+    for kind, part in (("6416", b"\0\0\1\xbb" + bytes(1000)), ("3640", sized)):
+        reader = PayloadReader(kind)  # type: ignore[arg-type]
         for _ in range(100):
-            reader.push(b"\0\0\1\xbb" + bytes(1000), marker=False)
-    reader = PayloadReader("3640")
-    part = b"\0\x11" + (8000 << 11).to_bytes(3, "big") + bytes(1000)
-    with pytest.raises(FormatError, match="fit together"):
-        for _ in range(100):
-            reader.push(part, marker=False)
+            with contextlib.suppress(FormatError):
+                reader.push(part, marker=False)
+            assert len(reader._part) <= MOST_UNIT_BYTES

@@ -26,6 +26,8 @@ from rtp_network import decoded, disturbed, frames_differ, packets_of, planes_of
 
 DATA = stream()
 SENT = fba.decode(DATA)
+assert SENT.face is not None
+VALUES = SENT.face.values
 PLANES = planes_of(DATA)
 SECOND = 25
 """Frames."""
@@ -49,7 +51,7 @@ def test_a_network_without_faults(kind: str, planes_per_packet: int, body: bool)
 
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")
 def test_all_valid_vectors() -> None:
-    """Also those whose planes begin inside a byte, that change their rate, skip frames, or have time codes."""
+    """Also those whose planes begin inside a byte, that change their rate, or skip frames."""
     count = 0
     for vector in read_vectors():
         if not vector.name.startswith("valid/"):
@@ -65,7 +67,8 @@ def test_all_valid_vectors() -> None:
                 continue  # several objects: the first is followed
             shown = decoded(parts)
             assert len(shown) == len(whole), vector.name
-            assert shown.face == whole.face and shown.body == whole.body, vector.name
+            assert shown.face == whole.face, vector.name
+            assert shown.body == whole.body, vector.name
             count += 1
     assert count > 100
 
@@ -81,17 +84,13 @@ def test_a_tenth_of_the_packets_is_lost(seed: int, kind: str) -> None:
     assert not list(frames_differ(shown, SENT))
     counts = reader.counts
     assert len(shown) == counts.planes
-    assert counts.doubled and counts.gaps
+    assert counts.doubled
+    assert counts.gaps
     assert len(shown) + counts.held + counts.late + counts.lost >= len(SENT) - 1
     gaps = np.diff(shown.index)
     assert (gaps > 1).sum() == counts.gaps
     for behind in shown.index[1:][gaps > 1]:
         assert behind % SECOND == 0  # it goes on with an I plane
-    salvaged = Decoder(on_error="salvage")  # as in a window, which shows what was lost
-    for part in received(RtpReader(), arrived):
-        salvaged.push(part)
-    lost = sum(damage.frames_lost or 0 for damage in salvaged.damage)
-    assert lost == int((gaps - 1)[gaps > 1].sum())
 
 
 def test_packets_out_of_order_cost_nothing() -> None:
@@ -133,8 +132,8 @@ def test_a_receiver_who_comes_late(at: int) -> None:
     shown = decoded(received(reader, packets_of(PLANES)[at:]))
     first = -(-at // SECOND) * SECOND
     assert shown.index[0] == first
-    assert shown.face is not None and SENT.face is not None
-    np.testing.assert_array_equal(shown.face.values, SENT.face.values[first:])
+    assert shown.face is not None
+    np.testing.assert_array_equal(shown.face.values, VALUES[first:])
     assert reader.counts.held == first - at
 
 
@@ -161,9 +160,9 @@ def test_another_sender_takes_over() -> None:
         assert reader.counts.senders == 2
         assert reader.counts.other_senders == 1  # its first packet: two in a row are needed
         shown = decoded(parts)
-        assert shown.face is not None and SENT.face is not None
-        np.testing.assert_array_equal(shown.face.values[:60], SENT.face.values[:60])
-        np.testing.assert_array_equal(shown.face.values[60:], SENT.face.values[25:60])
+        assert shown.face is not None
+        np.testing.assert_array_equal(shown.face.values[:60], VALUES[:60])
+        np.testing.assert_array_equal(shown.face.values[60:], VALUES[25:60])
         assert reader.counts.gaps == 1
         gap = shown.index[60] - shown.index[59]
         assert gap == 1 or abs(gap / 25 - pause - 1) < 0.6
@@ -248,7 +247,7 @@ def test_without_time_codes_a_loss_shortens_the_stream_by_less_than_two_seconds(
     parts = received(reader, [one for number, one in enumerate(packets) if number != 52])
     shown = decoded(parts)
     assert shown.index.tolist() == [*range(52), *range(100, 200)]  # 4 s: the first I plane at a whole second
-    late = packets_of([replace(plane, time=plane.time + 0.2) for plane in planes[60:]])
+    late = packets_of([replace(plane, time=plane.time + 0.12) for plane in planes[60:]])
     odd = [*packets_of(planes[:52], finish=False)]
     numbered = [write_packet(read_packet(data)._replace(sequence=(65_053 + number) % 65_536))
                 for number, (_, data) in enumerate(late)]  # fmt: skip

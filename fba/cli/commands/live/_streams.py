@@ -111,6 +111,7 @@ def _show(recording: Recording, face: FaceModel | None) -> None:
 
     name = str(recording.receiver.address)
     live = LiveAnimation(recording, name=name, bap_steps="auto")
+    recording.receiver.say = live.tell
     try:
         wait_for(live, lambda text: click.echo(f"fba: {text}", err=True))
         model = face or FaceModel.default()
