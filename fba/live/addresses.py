@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, cast
 from fba.errors import FbaError
 
 Scheme = Literal["rtp", "udp", "tcp"]
-_ADDRESS = re.compile(r"(rtp|udp|tcp)://?(?:\[([^\]]*)\]|([^:/\[\]]*)):(\d{1,5})/?")
+_ADDRESS = re.compile(r"(rtp|udp|tcp)://?(?:\[([^\]]*)\]|([^:/\[\]]*)):([0-9]{1,5})/?")
 _LIKE_ADDRESS = re.compile(r"[a-z][a-z0-9+.-]+:/")
 
 

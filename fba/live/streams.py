@@ -146,8 +146,9 @@ class StreamReceiver:
     """Receives a stream at an address of this computer; a context manager.
 
     source: an address, or a session by its description. delay: seconds that a packet waits for one before it.
-    wait: seconds within which the stream must begin. clock: monotonic, in seconds. say: called with a few words
-    when planes are missing, and when it goes on; it may be set later.
+    wait: seconds within which the stream must begin. clock: monotonic, in seconds.
+
+    say: an attribute, called with a few words when planes are missing, and when it goes on.
 
     Raises FbaError, on entering, where the port cannot be opened, and from `read1` where no stream comes.
     """
@@ -241,9 +242,8 @@ class StreamReceiver:
             return
         self._holding = self._reader.holding
         counts = self.counts
-        lost = f"{counts.lost} packets lost" if counts.lost else "the stream broke off"
-        times = "" if self._holding else f" {counts.gaps} times so far" if counts.gaps > 1 else " once so far"
-        self.say(f"{lost}: the pose {'is' if self._holding else 'was'} held{times}")
+        lost = f"packets lost, {counts.lost} so far" if counts.lost else "the stream broke off"
+        self.say(f"{lost}: {'the pose is held' if self._holding else 'it goes on'}")
 
     def nothing(self) -> str:
         """Return the reason why there is no stream."""

@@ -103,13 +103,12 @@ def test_ffmpeg_takes_the_planes_out_of_rfc_6416(tmp_path: Path) -> None:
 
     sending = threading.Thread(target=send)
     sending.start()
-    whitelist = {"protocol_whitelist": "file,rtp,udp", "fflags": "noparse+nobuffer+nofillin"}
+    options = {
+        "protocol_whitelist": "file,rtp,udp", "fflags": "noparse+nobuffer+nofillin", "probesize": "32",
+        "analyzeduration": "1",
+    }  # fmt: skip
     try:
-        with av.open(
-            str(tmp_path / "a.sdp"),
-            options={**whitelist, "probesize": "32", "analyzeduration": "1"},
-            timeout=60,
-        ) as opened:
+        with av.open(str(tmp_path / "a.sdp"), options=options, timeout=60) as opened:
             codec: Any = opened.streams[0].codec_context
             assert codec.name == "mpeg4"
             assert codec.profile == "Simple Face Animation Profile"
