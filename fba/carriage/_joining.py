@@ -139,7 +139,7 @@ class StreamJoiner:
         return True
 
     def _decodes(self, unit: Unit, data: bytes) -> bool:
-        """Whether a plane, and nothing behind it, is decoded in its place."""
+        """Whether a plane, and nothing but stuffing behind it, is decoded in its place."""
         if self._waiting:
             headers = full_configuration(unit.configuration or self._configuration)
             self._decoder, self._read = Decoder(), 0
@@ -152,8 +152,10 @@ class StreamJoiner:
                 blocks = self._decoder.push_blocks(headers + data)
         except FbaError:
             return False
-        stops = [int(block.borders[-1]) for block in blocks]
-        return sum(len(block.index) for block in blocks) == 1 and 0 < 8 * self._read - stops[-1] <= 8
+        if sum(len(block.index) for block in blocks) != 1:
+            return False
+        rest = 8 * self._read - int(blocks[-1].borders[-1])
+        return 0 < rest <= 8 and data[-1] & ((1 << rest) - 1) == (1 << rest - 1) - 1  # stuffing
 
     def _headers(self, unit: Unit) -> bytes:
         """Return the bytes before a plane: its start code, or those of the object that it begins."""

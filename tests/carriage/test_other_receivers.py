@@ -7,6 +7,7 @@ import socket
 import struct
 import subprocess
 import threading
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,7 @@ def test_tshark_dissects_every_packet(tmp_path: Path, kind: str, planes_per_pack
         assert marker in ("1", "True")
         assert not malformed
     times = [int(row[3]) for row in rows[:-3]]
-    steps = {(after - before) % 2**32 for before, after in zip(times, times[1:], strict=False)}
+    steps = {(after - before) % 2**32 for before, after in pairwise(times)}
     assert steps <= {3600 * count for count in range(1, planes_per_packet + 1)}
     expert = dissected(tmp_path / "a.pcap", *decode, "-Y", "_ws.expert.severity >= warning")
     assert expert == []
