@@ -15,10 +15,10 @@ from fba.cli.inputs import Reading, find_format, read_file
 from fba.cli.option_fields import option
 from fba.cli.web_server import INTRA_PERIOD
 from fba.encoder_options import EncoderOptions
-from fba.errors import FbaError, RangeError
+from fba.errors import FbaError, FormatError, RangeError
 from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO, BapTable
-from fba.source import naming_file, read_head, read_whole
+from fba.source import read_head, read_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -99,8 +99,11 @@ def network_source(file: Path) -> StreamAddress | Session:
     read_head(file)  # or an error for what is no file
     if file.stat().st_size > MOST_BYTES:
         raise FbaError(f"{file}: is no description of a session: longer than {MOST_BYTES} bytes")
-    with naming_file(file):
+    try:
         return read_sdp(read_whole(file))
+    except FormatError as error:
+        error.args = (f"{file}: {error.finding}",)
+        raise
 
 
 def opened(file: Path, receiving: Receiving, stack: ExitStack) -> StreamReceiver:

@@ -51,7 +51,7 @@ class _KindType(SourceType):
         if "://" not in str(value) and not str(value).lower().endswith(DESCRIPTION):
             near = did_you_mean(str(value), KINDS)
             self.fail(
-                f"{value!r} is none of {', '.join(KINDS)}{near}, no address such as {ADDRESSES}, and no "
+                f"{value!r} is not one of {', '.join(KINDS)}{near}, nor an address such as {ADDRESSES}, nor "
                 f"FILE{DESCRIPTION}",
                 param,
                 ctx,
