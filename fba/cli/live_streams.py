@@ -91,18 +91,16 @@ def is_from_network(file: Path) -> bool:
 
 def network_source(file: Path) -> StreamAddress | Session:
     """Return where a stream comes from. Raises FbaError."""
-    from fba.carriage.sdp import MOST_BYTES, read_sdp
+    from fba.carriage.sdp import read_sdp
     from fba.live.addresses import parse_address
 
     if file.suffix.lower() != DESCRIPTION:
         return parse_address(file.as_posix())
-    read_head(file)  # or an error for what is no file
-    if file.stat().st_size > MOST_BYTES:
-        raise FbaError(f"{file}: is no description of a session: longer than {MOST_BYTES} bytes")
     try:
-        return read_sdp(read_whole(file))
+        return read_sdp(read_head(file))
     except FormatError as error:
-        error.args = (f"{file}: {error.finding}",)
+        if error.path is None:
+            error.args = (f"{file}: {error.finding}",)
         raise
 
 

@@ -35,8 +35,8 @@ class _Stream:
 
     payload: Literal["3640", "6416"] = option(
         default="3640",
-        help="RFC of the RTP payload: 3640 is smaller, 6416 has start codes, for receivers that know only "
-        "MPEG-4 visual streams.",
+        help="RFC of the RTP payload: 3640 has sizes, and is smaller with several planes a packet; 6416 has "
+        "start codes, for receivers that know only MPEG-4 visual streams.",
     )
     planes_per_packet: int = option(
         default=1, type=click.IntRange(1, MOST_PLANES),
