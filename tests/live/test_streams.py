@@ -245,3 +245,27 @@ def test_a_pacer_stops() -> None:
     stopped = Pacer()
     stopped.stop()
     assert stopped.wait(100)
+
+
+def test_a_window_shows_what_arrives() -> None:
+    """The animation that `fba play` shows: it grows with the planes, and says that some are missing."""
+    live_module = pytest.importorskip("fba_player.playback.live")
+    target = address("rtp")
+    packets = [data for _, data in packets_of(PLANES, finish=False)]
+    with (
+        StreamReceiver(target, wait=60, delay=0.0) as receiver,
+        socket.socket(type=socket.SOCK_DGRAM) as sender,
+    ):
+        live = live_module.LiveAnimation(receiver, name=str(target), bap_steps="auto")
+        receiver.say = live.tell
+        for data in [*packets[:30], packets[31]]:
+            sender.sendto(data, target[1:])
+        assert live.wait(60)
+        while not live.message:
+            threading.Event().wait(0.005)
+        assert live.message == "packets lost, 1 so far: the pose is held"
+        for data in [*packets[32:], packets_of(PLANES)[-1][1]]:
+            sender.sendto(data, target[1:])
+        assert live.wait_end(60)
+        assert live.index.tolist() == [*range(30), *range(50, 60)]
+        live.close()
