@@ -87,6 +87,7 @@ class RtpReader:
         self._joiner = StreamJoiner(configuration)
         self._sender: _Sender | None = None
         self._candidate: _Sender | None = None
+        self._first: RtpPacket | None = None  # of the candidate
         self._heard = 0.0
         self._done = Counts()  # of the senders before
         self._order = PacketOrder(delay)
@@ -155,10 +156,12 @@ class RtpReader:
             return False
         expected = self._candidate is not None and self._candidate == (address, packet.ssrc, packet.sequence)
         if self._sender is not None and not expected:
-            self._candidate = this
+            self._candidate, self._first = this, packet
             return False
-        if self._sender is not None:
+        if self._sender is not None and self._first is not None:
             self._begin_anew(now)
+            self._order.push(self._first, now)
+            self.counts.other_senders -= 1
         self._sender, self._candidate = this, None
         self.counts.senders += 1
         return True
