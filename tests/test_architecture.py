@@ -36,6 +36,7 @@ fba.codec.settings
 fba.codec._plane
 fba.codec._stream
 fba.codec
+fba.serving
 fba.carriage
 fba.face.interpolation
 fba.face
@@ -74,7 +75,6 @@ fba.capture.points
 fba.capture
 fba.capture.live
 fba.emotion
-fba.carriage
 fba.formats
 fba.formats.text
 fba.formats.epf
@@ -87,7 +87,6 @@ fba.formats.face_tables
 fba.formats.avatar
 fba.live._protocols
 fba.live
-fba.serving
 fba.persona.points
 fba.persona.recognition
 fba.persona

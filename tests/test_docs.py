@@ -64,6 +64,12 @@ ILLUSTRATIONS = {
     ("docs/capture-live.md", "fba capture livelink -o - | fba play -"): WINDOW,
     ("docs/capture-live.md", "fba capture livelink --serve 8080 -o face.fba"): SENT,
     ("docs/capture-live.md", "fba serve hello.fba --loop"): "serves until somebody ends it",
+    ("docs/live.md", "fba play rtp://0.0.0.0:5004"): WINDOW,
+    ("docs/live.md", "fba capture rtp://0.0.0.0:5004 -o talk.fba"): ARRIVING,
+    (
+        "docs/live.md",
+        "tshark -i lo -d udp.port==50205,rtp -d rtp.pt==96,mp4v-es -V",
+    ): "watches a network; tests/carriage runs tshark",
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/carriage.md", "fba play hello.fba.mp4"): WINDOW,
     ("docs/develop.md", "./dev test"): CHECKOUT,

@@ -19,21 +19,26 @@ from scipy.spatial.transform import Rotation
 
 ROOT = Path(__file__).parents[1]
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
-sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("files", "figures")]
+sys.path[:0] = [str(ROOT / "tests" / "helpers" / folder) for folder in ("", "files", "figures")]
 
 import avatar_files  # noqa: E402
 from fba.arrays import Float64  # noqa: E402
 from fba.cache import load_or_make  # noqa: E402
 from fba.capture import MarkerMotion  # noqa: E402
 from fba.carriage.mp4 import split_samples, write_mp4  # noqa: E402
+from fba.carriage.rtp import write_frame  # noqa: E402
+from fba.carriage.sdp import Session, write_sdp  # noqa: E402
+from fba.carriage.sending import DatagramWriter  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.formats import read_motion  # noqa: E402
 from fba.live import KINDS  # noqa: E402
 from fba.persona import learn  # noqa: E402
+from fba.serving import Plane  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
 from live_senders import vmc_frames, vtube_objects  # noqa: E402
 from mesh_files import ply  # noqa: E402
 from mp4_files import Track, esds, fragmented_file, whole_file  # noqa: E402
+from rtp_network import PERIOD, packets_of, planes_of, stream  # noqa: E402
 from small_bodies import rod  # noqa: E402
 from small_people import write_person  # noqa: E402
 from stored_models import face  # noqa: E402
@@ -50,6 +55,7 @@ from tools.captures.face_files import (  # noqa: E402
     pyfeat_csv,
 )
 from tools.captures.tracked_actor import film  # noqa: E402
+from tools.fuzz._packets import CONNECTION, DATAGRAMS, DESCRIPTION, RTP  # noqa: E402
 from tools.fuzz._small_head import (  # noqa: E402
     small_head,
     small_head_fdp,
@@ -419,6 +425,33 @@ def live() -> dict[str, bytes]:
     }
 
 
+def packets() -> dict[str, bytes]:
+    """Return streams in packets: a byte for the kind, then packets behind a sender and a length."""
+    planes = planes_of(stream(12, replace(PERIOD, intra_period=0.2)))
+    body = planes_of(stream(3, PERIOD, body=True), body=True)
+    long = bytes([0x31]) + bytes(range(1, 250)) * 12  # no plane, but of more than one packet
+    part = Plane(long, 0.5, 25.0, units=(long,))
+    sent = {
+        "sizes": (RTP, packets_of(planes, planes_per_packet=3)),
+        "codes": (RTP, packets_of(planes, kind="6416")),
+        "body": (RTP, packets_of([*body, part], kind="6416")),
+        "parts": (RTP, packets_of([*planes[:2], part, *planes[3:]])),
+    }
+    writer = DatagramWriter(2)
+    bare = [(0.0, one) for plane in planes for one in writer.push(plane, 0.0)]
+    joined = b"".join(write_frame(data) for _, data in packets_of(planes))
+    sent["datagrams"] = DATAGRAMS, bare
+    sent["connection"] = CONNECTION, [(0.0, joined[at : at + 100]) for at in range(0, len(joined), 100)]
+    session = Session("192.168.0.20", 5004, configuration=bytes.fromhex("000001b061000001b523000001ba"))
+    return {
+        "description": bytes([DESCRIPTION]) + write_sdp(session).encode(),
+        **{
+            name: bytes([kind]) + b"".join(b"\0" + len(one).to_bytes(2, "big") + one for _, one in parts)
+            for name, (kind, parts) in sent.items()
+        },
+    }
+
+
 def markers() -> dict[str, bytes]:
     """Return captures of a face's markers in all formats: a mouth that opens, with one marker lost."""
     points = dict(zip(feature_point_names(), neutral_points(), strict=True))
@@ -502,6 +535,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
         },
         "capture": {**faces(), **markers()},
         "live": live(),
+        "rtp": packets(),
         "smpl": smpl(),
         "arf": avatar_units(folder),
         "persona": {"actor": persona(folder)},

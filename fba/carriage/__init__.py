@@ -1,4 +1,5 @@
-"""FBA streams inside other transports and files, as pure bytes: no files, no sockets.
+"""FBA streams in other containers and on the wire, as pure bytes: no sockets, no files, no clock.
 
-May use: codec and the data model. Files are opened in `fba.formats`, sound is coded in `fba_player.sound`.
+May use: codec, serving and the data model. Files are opened in `fba.formats`, sockets in `fba.live`, sound is
+coded in `fba_player.sound`.
 """

@@ -23,7 +23,7 @@ _COMMANDS = {
     "info": "Show what a file holds: frames, rate, parameters, bits; --trace lists every syntax element.",
     "encode": "Encode FAP, BAP or motion-capture files as an FBA stream.",
     "capture": "Receive a face or a person over the network, show it, record it as an FBA stream.",
-    "send": "Send a face to programs that receive Live Link Face.",
+    "send": "Send a stream over a network, or a face to programs that receive Live Link Face.",
     "decode": "Decode FBA streams to FAP, BAP, EPF, BVH and glTF files.",
     "convert": "Convert a file into another format.",
     "play": "Play a file in a window.",

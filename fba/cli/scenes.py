@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal, cast
 import click
 
 from fba.animation import Animation
-from fba.cli import inputs, options
+from fba.cli import inputs, live_streams, options
 from fba.cli.inputs import Reading
+from fba.cli.live_streams import Receiving
 from fba.cli.map_options import MAP, Maps, read_body_joints
 from fba.cli.option_fields import option
 from fba.errors import FbaError, FbaWarning, FormatError
@@ -134,19 +135,30 @@ def check_sound_options(sound: SoundOptions) -> None:
         raise click.UsageError("--audio-offset and --no-audio contradict each other")
 
 
-def open_file(file: Path, how: SceneOptions) -> inputs.ReadFile | LiveAnimation:
-    """Return the content of a file, or a growing animation of an FBA stream on standard input or in a FIFO.
+def open_file(
+    file: Path, how: SceneOptions, receiving: Receiving, stack: contextlib.ExitStack
+) -> inputs.ReadFile | LiveAnimation:
+    """Return the content of a file, or a growing animation of a stream that arrives.
+
+    That is one on standard input, in a FIFO, or from a network, whose receiver the stack closes.
 
     Other formats are read to their end first. Raises click.UsageError if standard input is a terminal, and
     what `inputs.read_file` and `LiveAnimation.wait` raise.
     """
     name = "standard input" if str(file) == "-" else file.name
+    if live_streams.is_from_network(file):
+        from fba_player.playback.live import LiveAnimation
+
+        receiver = live_streams.opened(file, receiving, stack)
+        live = LiveAnimation(receiver, name=str(receiver.address), bap_steps=how.bap_steps)
+        receiver.say = live.tell
+        return _arrived(live)
     if str(file) == "-" and sys.stdin.isatty():
         raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     if str(file) != "-" and not is_pipe(file):
         return inputs.read_file(file, how)
-    with contextlib.ExitStack() as stack:
-        piped = sys.stdin.buffer if str(file) == "-" else stack.enter_context(_fifo(file))
+    with contextlib.ExitStack() as opened:
+        piped = sys.stdin.buffer if str(file) == "-" else opened.enter_context(_fifo(file))
         source = cast("BufferedReader", piped)
         head = b""
         while len(head) < 4 and (more := source.read1(1 << 16)):
@@ -155,13 +167,20 @@ def open_file(file: Path, how: SceneOptions) -> inputs.ReadFile | LiveAnimation:
             raise FormatError("is empty", path=name)
         if not head.startswith(STREAM_STARTS):
             return _read_other(head, source, name, how)
-        from fba_player.playback.live import LiveAnimation, wait_for
+        from fba_player.playback.live import LiveAnimation
 
-        close = stack.pop_all().close
+        close = opened.pop_all().close
         live = LiveAnimation(source, head=head, name=name, bap_steps=how.bap_steps, at_end=close)
+    return _arrived(live)
+
+
+def _arrived(live: LiveAnimation) -> LiveAnimation:
+    """Wait for the first frames of a stream; return it."""
+    from fba_player.playback.live import wait_for
+
     wait_for(live, lambda text: click.echo(f"fba: {text}", err=True))
     if live.steps_explanation:
-        click.echo(f"fba: {name}: BAP steps {live.steps_explanation}", err=True)
+        click.echo(f"fba: {live.name}: BAP steps {live.steps_explanation}", err=True)
     return live
 
 

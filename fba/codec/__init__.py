@@ -8,6 +8,7 @@ from fba.codec._decoder import Decoder, decode
 from fba.codec._encoder import ClampedParameter, Encoder, EncoderStatistics, encode_animation
 from fba.codec._frame_buffers import DecodedFrames, FrameBuffer
 from fba.codec._plane.pricing import NextPlane
+from fba.codec._plane_start import PlaneStart, read_plane_start, replace_time_code
 from fba.codec._quantisation import (
     coarsest_quantisers,
     count_rounded,
@@ -19,6 +20,7 @@ from fba.codec._quantisation import (
 )
 from fba.codec._recoding import StreamPlanes, read_planes, recode
 from fba.codec._script import encode_planes
+from fba.codec._stream.clock import time_code
 from fba.codec._stream.damage import Damage
 from fba.codec._stream.mark import marked_table, write_mark, write_opening
 from fba.codec._stream_info import PartInfo, StreamInfo, probe_stream
@@ -42,6 +44,7 @@ __all__ = [
     "PartSettings",
     "PlaneInfo",
     "PlaneSettings",
+    "PlaneStart",
     "RangeLists",
     "StreamInfo",
     "StreamPlanes",
@@ -59,9 +62,12 @@ __all__ = [
     "probe_stream",
     "quantise",
     "range_limit",
+    "read_plane_start",
     "read_planes",
     "recode",
+    "replace_time_code",
     "step_scale",
+    "time_code",
     "verify_stream",
     "write_mark",
     "write_opening",

@@ -5,7 +5,9 @@
         receiver.run(seconds=10)
     print(capture.finish())
 
-May use: capture, codec and formats. Independent of windows and the command line.
+Streams that are sent and received as they are, over RTP, UDP and TCP, are in `fba.live.streams`.
+
+May use: capture, carriage, codec, formats and serving. Independent of windows and the command line.
 """
 
 from fba.live._capture import Capture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import ipaddress
 import select
 import socket
 import struct
@@ -61,23 +62,7 @@ class Receiver:
         self._stop = threading.Event()
 
     def __enter__(self) -> Receiver:
-        family = socket.AF_INET6 if ":" in self._host else socket.AF_INET
-        opened = socket.socket(family, socket.SOCK_DGRAM)
-        try:
-            opened.bind((self._host, self.port))
-        except (OSError, OverflowError) as error:
-            opened.close()
-            where = f"{self._host or 'any address'}, UDP port {self.port}"
-            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            remedy = (
-                "give an address of this machine, or none for all"
-                if isinstance(error, socket.gaierror) or getattr(error, "errno", 0) == errno.EADDRNOTAVAIL
-                else "close the program that uses it, or give another port here and in the sender"
-            )
-            raise FbaError(f"{where}: cannot be listened on: {reason}; {remedy}") from error
-        with contextlib.suppress(OSError):  # a smaller buffer will do
-            opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
-        opened.setblocking(False)
+        opened = open_udp(self._host, self.port)
         self._socket = opened
         self.port = int(opened.getsockname()[1])
         return self
@@ -146,6 +131,50 @@ class Receiver:
                 f"{self._ask}: cannot be asked for data: {error.strerror or error}; give the address that "
                 "the app shows, such as 192.168.0.20"
             ) from error
+
+
+def open_udp(host: str, port: int) -> socket.socket:
+    """Return a socket that receives datagrams, without blocking. host: own address, or a group; "" for all.
+
+    Raises FbaError where it cannot be opened.
+    """
+    where = f"{host or 'any address'}, UDP port {port}"
+    try:
+        found = socket.getaddrinfo(host or "0.0.0.0", port, type=socket.SOCK_DGRAM, flags=socket.AI_PASSIVE)
+        family, _, _, _, address = found[0]
+        opened = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            _bind(opened, address)
+        except BaseException:
+            opened.close()
+            raise
+    except (OSError, OverflowError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        remedy = (
+            "give an address of this machine, or none for all"
+            if isinstance(error, socket.gaierror) or getattr(error, "errno", 0) == errno.EADDRNOTAVAIL
+            else "close the program that uses it, or give another port here and in the sender"
+        )
+        raise FbaError(f"{where}: cannot be listened on: {reason}; {remedy}") from error
+    with contextlib.suppress(OSError):  # a smaller buffer will do
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+    opened.setblocking(False)
+    return opened
+
+
+def _bind(opened: socket.socket, address: tuple[Any, ...]) -> None:
+    """Bind a socket to an address; join the group if it is one."""
+    group = ipaddress.ip_address(address[0].partition("%")[0])
+    if not group.is_multicast:
+        opened.bind(address)
+        return
+    opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    opened.bind(("", address[1]) if sys.platform == "win32" else address)
+    if group.version == 4:
+        opened.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group.packed + bytes(4))
+    else:
+        interface = struct.pack("=I", address[3])
+        opened.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_JOIN_GROUP, group.packed + interface)
 
 
 def _dropped(opened: socket.socket) -> int | None:

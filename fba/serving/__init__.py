@@ -26,16 +26,20 @@ A connection that closes with code 1000 is over; after any other code, viewers m
 May use: codec and the data model. Independent of the page, of captures and of the command line.
 """
 
-from fba.serving._pacing import Stage, show_file, show_pipe
+from fba.serving._pacing import Pace, Stage, arriving, paced, show_file, show_pipe
 from fba.serving._planes import Plane, PlaneSplitter, split_stream
-from fba.serving._server import MOST_VIEWERS, Server
+from fba.serving._server import MOST_VIEWERS, Server, listen
 
 __all__ = [
     "MOST_VIEWERS",
+    "Pace",
     "Plane",
     "PlaneSplitter",
     "Server",
     "Stage",
+    "arriving",
+    "listen",
+    "paced",
     "show_file",
     "show_pipe",
     "split_stream",

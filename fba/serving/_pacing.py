@@ -17,7 +17,17 @@ NOBODY = 0.05
 """Seconds after which it is checked again whether somebody watches."""
 
 
-class Stage(Protocol):
+class Pace(Protocol):
+    """A clock to wait by."""
+
+    def clock(self) -> float:
+        """Return the seconds of a monotonic clock."""
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for so long; return True, at once, where all is to stop."""
+
+
+class Stage(Pace, Protocol):
     """Where a stream is shown: a channel, seen from the thread of its source."""
 
     @property
@@ -27,12 +37,6 @@ class Stage(Protocol):
     @property
     def newcomers(self) -> int:
         """Number of viewers who got no plane yet."""
-
-    def clock(self) -> float:
-        """Return the seconds of a monotonic clock."""
-
-    def wait(self, seconds: float) -> bool:
-        """Wait for so long; return True, at once, where the server stops."""
 
     def publish(self, plane: Plane) -> None:
         """Send a plane to the viewers."""
@@ -64,9 +68,14 @@ def show_pipe(stage: Stage, read: Callable[[int], bytes], splitter: PlaneSplitte
     read: returns up to a number of bytes that have arrived, b"" at the end. A file that comes faster than
     real time is slowed down to it. Raises BitstreamError for a stream without planes, LimitError, OSError.
     """
-    for plane in paced(_arriving(read, splitter), stage, lead=LEAD):
+    for plane in arriving(read, splitter, stage):
         stage.publish(plane)
     stage.end(splitter.ending)
+
+
+def arriving(read: Callable[[int], bytes], splitter: PlaneSplitter, pace: Pace) -> Iterator[Plane]:
+    """Yield the planes of a stream that arrives, not faster than in real time; see `show_pipe`."""
+    return paced(_arriving(read, splitter), pace, lead=LEAD)
 
 
 def _arriving(read: Callable[[int], bytes], splitter: PlaneSplitter) -> Iterator[Plane]:
@@ -75,14 +84,14 @@ def _arriving(read: Callable[[int], bytes], splitter: PlaneSplitter) -> Iterator
     yield from splitter.finish()
 
 
-def paced(planes: Iterable[Plane], stage: Stage, *, lead: float = 0.0) -> Iterator[Plane]:
-    """Yield each plane at its time, or `lead` seconds before it, until the server stops."""
+def paced(planes: Iterable[Plane], pace: Pace, *, lead: float = 0.0) -> Iterator[Plane]:
+    """Yield each plane at its time, or `lead` seconds before it, until all is to stop."""
     begun = last = 0.0
     for count, plane in enumerate(planes):
         if not count or not 0 <= plane.time - last <= LONGEST_PAUSE:
-            begun = stage.clock() - plane.time
+            begun = pace.clock() - plane.time
         last = plane.time
-        due = begun + plane.time - lead - stage.clock()
-        if stage.wait(max(due, 0.0)):
+        due = begun + plane.time - lead - pace.clock()
+        if pace.wait(max(due, 0.0)):
             return
         yield plane

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from fba.codec import Block, Decoder, PlaneSettings, write_opening
@@ -31,7 +31,8 @@ class Plane:
     data: bytes of the stream, from behind the plane before it to the byte in which this plane ends. time:
     seconds. rate: frames per second. opening: data for viewers who begin here, with the configuration; b""
     where nobody can begin. fresh: whether no decoder can go on to it from the plane before: it begins an
-    object, or follows damage.
+    object, or follows damage. units: the plane alone, without a start code: its bits, from the first of a
+    byte on, and stuffing (0, then 1s) up to a byte; several, if more planes end in the last byte of `data`.
     """
 
     data: bytes
@@ -39,6 +40,12 @@ class Plane:
     rate: float
     opening: bytes = b""
     fresh: bool = False
+    units: tuple[bytes, ...] = ()
+
+    @property
+    def configuration(self) -> bytes:
+        """What `opening` begins with: the headers up to the start code of the object."""
+        return self.opening[: self.opening.find(_OBJECT) + len(_OBJECT)] if self.opening else b""
 
 
 class PlaneSplitter:
@@ -103,23 +110,34 @@ class PlaneSplitter:
             self._end = start
         renewed = self._state.renewed_by(block.settings, times[0])
         joinable = begins or (renewed and block.settings.start_code)
+        code = self._bytes(start, borders[1]).find(_CODE) if block.settings.start_code else -1
+        begin = start if code < 0 else 8 * ((start + 7) // 8 + code + len(_CODE) + 1)
         planes: list[Plane] = []
         for time, end in zip(times, borders[1:], strict=True):
-            data = self._bytes(self._end, end)
-            self._end = end
+            data, unit = self._bytes(self._end, end), self._unit(begin, end)
+            begin = self._end = end
             if data or not planes:
-                planes.append(Plane(data, time, rate))
+                planes.append(Plane(data, time, rate, units=(unit,)))
+            else:
+                planes[-1] = replace(planes[-1], units=(*planes[-1].units, unit))
         if planes and (fresh or joinable):
             data = planes[0].data
             at = data.find(_CODE) if block.settings.start_code else 0
             begun = self._configuration + data[at:] if joinable else b""
-            planes[0] = Plane(data, times[0], rate, begun, fresh)
+            planes[0] = replace(planes[0], opening=begun, fresh=fresh)
         self.planes += len(planes)
         return planes
 
     def _bytes(self, begin: int, end: int) -> bytes:
         """Return the bytes of the stream behind that of one bit, up to that of another."""
         return bytes(self._data[max((begin + 7) // 8 - self._offset, 0) : (end + 7) // 8 - self._offset])
+
+    def _unit(self, begin: int, end: int) -> bytes:
+        """Return the bits of the stream from one to another, and stuffing up to a byte."""
+        number = int.from_bytes(self._data[begin // 8 - self._offset : (end + 7) // 8 - self._offset], "big")
+        bits, stuffing = end - begin, 8 - (end - begin) % 8
+        number = (number >> -end % 8) & ((1 << bits) - 1)
+        return (number << stuffing | (1 << stuffing - 1) - 1).to_bytes((bits + stuffing) // 8, "big")
 
 
 class _State:

@@ -40,7 +40,8 @@ def performance(face: bool = True, body: bool = True, rate: int = 25, first: int
 
 def test_the_table() -> None:
     assert [entry.name for entry in formats()] == [
-        "fba", "fap", "bap", "epf", "bvh", "vrma", "gltf", "smpl", "arf", "mp4", "openface", "pyfeat", "livelink",
+        "fba", "fap", "bap", "epf", "bvh", "vrma", "gltf", "smpl", "arf", "mp4", "openface", "pyfeat",
+        "livelink",
         "livelink-udp", "ifacialmocap", "shapes-json", "points", "c3d", "trc", "motive", "nexus", "qualisys",
         "markers",
     ]  # fmt: skip

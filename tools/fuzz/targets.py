@@ -88,6 +88,12 @@ def targets() -> tuple[Target, ...]:
             b"/VMC/Ext/T\0\0,f\0\0", b",sfffffff\0\0\0", b"NaN", b"1e999", b'"FaceFound":true', b"jawOpen&1|",
             b"=head#0,0,0,0,0,0|", b"___iFacialMocap", b"[" * 300, *_TEXT,
         ),
+        Target(
+            "rtp", "streams in packets, each in a part; connections; descriptions of sessions",
+            "tools.fuzz._packets:check_rtp",
+            (b"\x80\xe0", b"\xb0\x60", b"\0\x11", b"\xff\xff", b"\0\0", b"\r\na=fmtp:96 ", b"config=", b";",
+             b"IN IP6 ::1", *_START_CODES),
+        ),
         _reader("face", "face models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
         _reader("body", "body models (.glb)", b"null", b"[]", b"{}", b"-1", b"1e400", *_TEXT),
         _reader("obj", "OBJ meshes", b"v 1 2 3\n", b"f 1 2 3\n", b"f -1/1/1 -2// 3\n", b"g a\n", b"\\\n",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import click
 from fba.cli import options, scenes
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ReadFile
+from fba.cli.live_streams import SOURCE, Receiving, is_from_network
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.scenes import MOST_FILES, SceneOptions, SoundOptions, check_files
 from fba.parameters import BAP_STEPS_DEFAULT
@@ -39,16 +41,18 @@ class _Window:
         "fba play walk.fba",
         "fba play walk.bvh --loop --speed 0.5",
         "fba play original.fap decoded.fba --compare",
+        "fba play rtp://0.0.0.0:5004",
         "nc host 7000 | fba play -",
         "fba play --model face.glb",
     ),
 )
-@scenes.files_argument
+@click.argument("files", type=SOURCE, nargs=-1, metavar="[FILE...]")
 @with_options
 def command(
     files: tuple[Path, ...],
     sound: SoundOptions,
     window: _Window,
+    receiving: Receiving,
     compare: bool = option(
         default=False,
         help="Two files or more: the others as drawings over the first, and by how much each parameter "
@@ -66,14 +70,16 @@ def command(
 ) -> None:
     """Play files in a window: space plays and pauses, arrows step, F1 shows all keys.
 
-    - is standard input: an FBA stream is shown while it arrives, as it is from a FIFO. Several files are
-    shown together. Without a file, --model or --body opens a neutral figure with sliders to move it by hand.
-    Without a display, use `fba render`.
+    - is standard input: an FBA stream is shown while it arrives, as it is from a FIFO, and as one that is
+    sent to an address of this computer, rtp://HOST:PORT, or to that of a description, FILE.sdp. Several
+    files are shown together. Without a file, --model or --body opens a neutral figure with sliders to move
+    it by hand. Without a display, use `fba render`.
     """
     if len(files) < 2 and compare:
         single = f"; {files[0]} is one" if files else ""
         raise click.UsageError(f"--compare needs two files or more{single}")
     check_files(files, how, sound, "window")
+    receiving.check(files)
     if [str(file) for file in files].count("-") > 1:
         raise click.UsageError("standard input (-) can be shown once")
     if not files and sound.audio is not None:
@@ -86,10 +92,10 @@ def command(
     if not files:
         dropped = _puppet(how, window.size)
     else:
-        dropped = _play(files, how, sound, window, compare=compare, start=start, paused=paused)
+        dropped = _play(files, how, sound, window, receiving, compare=compare, start=start, paused=paused)
     while dropped:
         beside = SoundOptions(no_audio=sound.no_audio)
-        dropped = _play(dropped[:MOST_FILES], replace(how, arrange=None), beside, window)
+        dropped = _play(dropped[:MOST_FILES], replace(how, arrange=None), beside, window, receiving)
 
 
 def _play(
@@ -97,6 +103,7 @@ def _play(
     how: SceneOptions,
     sound: SoundOptions,
     window: _Window,
+    receiving: Receiving,
     *,
     compare: bool = False,
     start: float | None = None,
@@ -108,10 +115,11 @@ def _play(
     audio = scenes.find_sound(files, sound, "played without sound")
     streams: list[LiveAnimation] = []
     whole: list[ReadFile] = []
+    receivers = ExitStack()
     try:
         animations: list[Animation | LiveAnimation] = []
         for file in files:
-            opened = scenes.open_file(file, how)
+            opened = scenes.open_file(file, how, receiving, receivers)
             if isinstance(opened, ReadFile):
                 animations.append(opened.animation)
                 whole.append(opened)
@@ -119,8 +127,8 @@ def _play(
                 animations.append(opened)
                 streams.append(opened)
         names = [
-            animation.name if name == "-" else name
-            for name, animation in zip(scenes.display_names(files), animations, strict=True)
+            animation.name if name == "-" or is_from_network(file) else name
+            for file, name, animation in zip(files, scenes.display_names(files), animations, strict=True)
         ]
         scene = scenes.build_scene(animations, names, how, over=compare)
         tables = [read.table for read in whole if read.table is not None]
@@ -149,6 +157,7 @@ def _play(
             for text in filter(None, (stream.details, stream.doubt)):
                 click.echo(f"fba: warning: {stream.name}: {text}", err=True)
             stream.close()
+        receivers.close()
 
 
 def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:

@@ -171,6 +171,10 @@ class LiveAnimation:
         with self._changed:
             return self._changed.wait_for(lambda: not self.growing, timeout)
 
+    def tell(self, message: str) -> None:
+        """Show a message of the source, such as that a part of the stream was lost."""
+        self.message = message
+
     def close(self) -> None:
         """Stop reading; the thread ends with the next bytes."""
         self._closing = True

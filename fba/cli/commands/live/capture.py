@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -19,12 +19,13 @@ from fba.cli.coding.clamped_values import clamped_lines
 from fba.cli.command import Command, examples
 from fba.cli.inputs import read_model
 from fba.cli.interruptions import raise_delayed, stopping
+from fba.cli.live_streams import ADDRESSES, DESCRIPTION, Receiving, SourceType, network_source
 from fba.cli.option_fields import option, option_like, with_options
 from fba.cli.outputs import STANDARD, Output, Outputs, display_name, output_option
 from fba.cli.printing import rate_text, seconds_text
 from fba.cli.web_server import HOST_HELP, INTRA_PERIOD, StreamTarget, open_server
 from fba.encoder_options import QUANT_MAX, EncoderOptions
-from fba.errors import FbaError
+from fba.errors import FbaError, did_you_mean
 
 if TYPE_CHECKING:
     from fba.live import Capture, Kind, Receiver, StreamRecorder, Summary
@@ -33,8 +34,29 @@ if TYPE_CHECKING:
     from fba.tracks import BodyTrack, FaceTrack
 
 KINDS = ("livelink", "ifacialmocap", "vtube", "vmc")
+_OF_KINDS = (
+    "port", "host", "ask", "sender", "rate", "neutral", "swap", "preset", "fap_quant", "bit_rate", "buffer",
+)  # fmt: skip
+"""Options that only the protocols of telephones and programs have."""
 LONGEST_NEUTRAL = 60.0
 """Seconds."""
+
+
+class _KindType(SourceType):
+    """A protocol, or where a stream comes from; both as text."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if str(value) in KINDS:
+            return str(value)
+        if "://" not in str(value) and not str(value).lower().endswith(DESCRIPTION):
+            near = did_you_mean(str(value), KINDS)
+            self.fail(
+                f"{value!r} is not one of {', '.join(KINDS)}{near}, nor an address such as {ADDRESSES}, nor "
+                f"FILE{DESCRIPTION}",
+                param,
+                ctx,
+            )
+        return super().convert(value, param, ctx).as_posix()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +132,7 @@ class _Request:
     )  # fmt: skip
     serve_host: str | None = option(metavar="ADDRESS", help=f"With --serve: {HOST_HELP}")
     network: _Network
+    receiving: Receiving
     seconds: Fraction | None = option(
         type=options.PERIOD, metavar="SECONDS", help="Stop after that; default: on Ctrl-C."
     )
@@ -141,16 +164,19 @@ class _Request:
         "fba capture vtube --ask 192.168.0.20 --play",
         "fba capture vmc -o person.fba",
         "fba capture livelink --serve 8080",
+        "fba capture rtp://0.0.0.0:5004 -o talk.fba",
     ),
 )
-@click.argument("kind", type=click.Choice(KINDS), metavar=f"[{'|'.join(KINDS)}]")
+@click.argument("kind", type=_KindType(), metavar=f"[{'|'.join(KINDS)}|{ADDRESSES}|FILE{DESCRIPTION}]")
 @with_options
 def command(request: _Request) -> None:
     """Receive a captured face or person over the network, show it, and record it as an FBA stream.
 
     livelink is Live Link Face, ifacialmocap also Facemotion3d, vtube VTube Studio on a telephone, vmc any
-    program that performs by the VMC protocol, bodies too. The file is complete at any moment, whatever
-    happens to this program. Ctrl-C ends it and prints what was received, and what was left out.
+    program that performs by the VMC protocol, bodies too. An address of this computer, or a description of
+    a session, stands for a stream that `fba send` or another program sends; it is recorded as it comes. The
+    file is complete at any moment, whatever happens to this program. Ctrl-C ends it and prints what was
+    received, and what was left out.
     """
     _check(request)
     output, network, coding = request.output, request.network, request.coding
@@ -160,6 +186,9 @@ def command(request: _Request) -> None:
         from fba import player
 
         player.check_display()  # before work that takes long
+    if request.kind not in KINDS:
+        _record(request, outputs)
+        return
     from fba.live import find_kind
     from fba.live.recording import warm_up
 
@@ -174,6 +203,22 @@ def command(request: _Request) -> None:
         if server is not None:
             targets.append(StreamTarget(server.stage(0)))
         _capture(request, kind, outputs, targets, stream)
+
+
+def _record(request: _Request, outputs: Outputs) -> None:
+    """Record a stream that comes from a network."""
+    from fba.cli.commands.live._streams import Recording, record
+
+    source = network_source(Path(request.kind))
+    seconds = None if request.seconds is None else float(request.seconds)
+    targets, _ = _targets(request.output, play=False)
+    raise_delayed()  # from here on, Ctrl-C ends the capture and not the command
+    with _server(request, request.kind) as server, request.receiving.open(source) as receiver:
+        if server is not None:
+            targets.append(StreamTarget(server.stage(0)))
+        recording = Recording(receiver, targets)
+        record(recording, seconds, read_model(request.model) if request.play else None, play=request.play)
+    recording.report(outputs, request.output, as_json=request.as_json)
 
 
 def _server(request: _Request, title: str) -> AbstractContextManager[Server | None]:
@@ -215,6 +260,11 @@ def _capture(
 def _check(request: _Request) -> None:
     """Raise click.UsageError for options that contradict each other."""
     coding = request.coding
+    request.receiving.check((Path(request.kind),))
+    for name in _OF_KINDS if request.kind not in KINDS else ():
+        if options.is_given(name):
+            flag = {"bit_rate": "--bitrate", "fap_quant": "--quant", "rate": "--fps"}.get(name, f"--{name}")
+            raise click.UsageError(f"{flag} goes with {', '.join(KINDS)}: a stream is recorded as it comes")
     if request.output is None and not request.play and request.serve is None:
         raise click.UsageError("give -o OUT.fba to record, --play or --serve PORT to see it, or several")
     if request.serve_host is not None and request.serve is None:
