@@ -85,6 +85,7 @@ fba.formats.face_tables
 fba.live._protocols
 fba.live
 fba.serving
+fba.archive
 fba.persona.points
 fba.persona.recognition
 fba.persona
