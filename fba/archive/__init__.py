@@ -9,6 +9,8 @@ faces, bodies, emotions, formats, and the planes that `fba.serving` splits strea
 written by the package pyarrow, queries are answered by duckdb: the extra `archive`.
 """
 
+from fba.archive._batch import RECORD, Conversion, convert_batch
+from fba.archive._cluster import for_each_on
 from fba.archive._index import Indexed, index_archive, query
 from fba.archive._making import (
     Check,
@@ -29,9 +31,11 @@ __all__ = [
     "CHUNK",
     "DEFAULT_PERIOD",
     "KINDS",
+    "RECORD",
     "Archive",
     "Check",
     "Coding",
+    "Conversion",
     "Indexed",
     "Kind",
     "Outcome",
@@ -40,11 +44,13 @@ __all__ = [
     "Source",
     "Windows",
     "check_levels",
+    "convert_batch",
     "count_processors",
     "describe_archive",
     "extract",
     "find_sources",
     "for_each",
+    "for_each_on",
     "index_archive",
     "label_by_folders",
     "label_by_table",

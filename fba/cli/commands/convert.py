@@ -9,12 +9,13 @@ import click
 
 from fba.choices import BapTableOrAuto
 from fba.cli import map_options, options, step_tables, writer_options
+from fba.cli.batch import Batch, BatchInput, BatchOutput, convert_folder
 from fba.cli.coding.coded_streams import encode_stream
 from fba.cli.coding.size_options import Size
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ReadFile, Reading, check_clip, has_markers, has_skeleton, read_file
 from fba.cli.option_fields import group, with_options
-from fba.cli.outputs import Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.outputs import Output, Outputs, display_name, find_writer
 from fba.cli.recordings.inputs import Inputs
 from fba.encoder_options import EncoderOptions
 from fba.errors import FormatError
@@ -31,10 +32,11 @@ from fba.source import naming_file
         "fba convert walk.bap walk.bvh --joints moving",
         "fba convert both.fba person.glb --model head.glb",
         "fba convert walk.bvh - --to bap | less",
+        "fba convert --batch captures streams --to fba --jobs 4",
     ),
 )
-@click.argument("source", metavar="IN", type=options.EXISTING)
-@click.argument("target", metavar="OUT", type=OutputType())
+@click.argument("source", metavar="IN", type=BatchInput())
+@click.argument("target", metavar="OUT", type=BatchOutput())
 @with_options
 def command(
     source: Path,
@@ -46,11 +48,37 @@ def command(
     given: writer_options.WriterOptions = group(),
     mark: bool | None = options.mark_option,
     reading: Reading = group(bap_steps=options.written_steps_option),
+    batch: Batch = group(),
 ) -> None:
     """Convert a file into another format; the content of IN and the suffix of OUT say which.
 
-    - is standard input or output. A stream is written as `fba encode` does without options.
+    - is standard input or output. A stream is written as `fba encode` does without options. With --batch, IN
+    and OUT are folders, --to names the format, and OUT/conversions.csv lists what was done.
     """
+    given_options = {
+        "rate": rate, "to": to, "no_clobber": no_clobber, "maps": maps, "given": given, "mark": mark,
+        "reading": reading,
+    }  # fmt: skip
+    if batch.batch:
+        convert_folder(source, target, to, batch, convert_file, given_options)
+    else:
+        batch.check_alone()
+        convert_file(source, target, **given_options)
+
+
+def convert_file(
+    source: Path,
+    target: Path,
+    *,
+    rate: Fraction | None,
+    to: str | None,
+    no_clobber: bool,
+    maps: map_options.Maps,
+    given: writer_options.WriterOptions,
+    mark: bool | None,
+    reading: Reading,
+) -> None:
+    """Convert a file, as the options say. Its result appears whole or not at all."""
     writing = find_writer(target, to)  # raises its errors before anything is read
     read_files = [source, given.model, given.body]
     outputs = Outputs([Output.of_format("OUT", target, writing)], read_files, no_clobber=no_clobber)

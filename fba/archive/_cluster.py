@@ -1,0 +1,124 @@
+"""A function over many items on a cluster of dask.distributed: nothing is lost, and nothing counts twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from itertools import islice
+from typing import Any, TypeVar
+
+from fba.archive._pool import Outcome, run_chunk
+from fba.errors import FbaError, OptionError
+
+CONNECT_SECONDS = 10.0
+"""Time within which the scheduler must answer."""
+LOST_SECONDS = 30.0
+"""Time after which a scheduler that does not answer counts as ended."""
+CHUNK = 50
+"""Items that a worker gets at once: a task costs the scheduler about a millisecond."""
+_AHEAD = 1000
+"""Chunks that are handed out before their results are taken."""
+
+Item = TypeVar("Item")
+Value = TypeVar("Value")
+
+
+def for_each_on(
+    address: str, function: Callable[[Item], Value], items: Iterable[Item], *, chunk: int = CHUNK
+) -> Iterator[Outcome[Item, Value]]:
+    """Yield what a function makes of each item, as soon as it is done, on the workers of a cluster.
+
+    address: of a scheduler, "tcp://host:8786". function, items: picklable; the workers have this package
+    installed, and reach the same files. chunk: items that a worker gets at once. What a worker that ends had
+    not finished, another does again; an item at which several workers end fails by itself.
+
+    Raises FbaError without the package distributed, if the scheduler does not answer, and if it ends: the
+    error says how many items are missing.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise FbaError(
+            'clusters are reached by the package distributed: pip install "mpeg4-fba[cluster]"'
+        ) from None
+    waiting = list(items)
+    missing = len(waiting)
+    try:
+        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+    except ValueError as error:
+        raise OptionError(f"{address!r} is no address of a scheduler: {error}") from error
+    except OSError as error:
+        raise FbaError(
+            f"the scheduler {address} does not answer: {' '.join(str(error).split())[:200]}; start one with "
+            "`dask scheduler`"
+        ) from error
+    chunks = iter([waiting[at : at + chunk] for at in range(0, len(waiting), chunk)])
+    try:
+        given: dict[Any, list[Item]] = {}
+        running = as_completed(loop=client.loop)
+
+        def hand_out(part: list[Item]) -> None:
+            future = client.submit(run_chunk, function, part, pure=False)
+            given[future] = part
+            running.add(future)
+
+        for part in islice(chunks, _AHEAD):
+            hand_out(part)
+        while given:
+            future = _next(running, client, missing, address)
+            part = given.pop(future)
+            failure = None if future.status == "finished" else _failure(future)
+            if failure is None:
+                outcomes = future.result()
+                missing -= len(outcomes)
+                yield from outcomes
+            elif len(part) > 1:
+                for item in part:
+                    hand_out([item])
+            else:
+                missing -= 1
+                yield Outcome(part[0], None, failure)
+            for following in islice(chunks, 1):
+                hand_out(following)
+    finally:
+        with suppress(Exception):  # the scheduler may be gone
+            client.close(timeout=CONNECT_SECONDS)
+
+
+def _next(running: Any, client: Any, missing: int, address: str) -> Any:
+    """Return the next future that is done. Raises FbaError if the scheduler has ended."""
+    waited = 0.0
+    while True:
+        try:
+            future = next_within(running, 1.0)
+        except TimeoutError:
+            waited = 0.0 if client.status == "running" else waited + 1.0
+            if waited < LOST_SECONDS:
+                continue
+            future = None
+        if future is None or future.status in ("cancelled", "lost"):
+            raise FbaError(
+                f"the scheduler {address} has ended: {missing} of the files are missing; start it again, and "
+                "the same command, which goes on where it stopped"
+            )
+        return future
+
+
+def next_within(running: Any, seconds: float) -> Any:
+    """Return the next future of an `as_completed`; TimeoutError if none is done in time."""
+    import time
+
+    end = time.monotonic() + seconds
+    while running.is_empty():
+        if time.monotonic() > end:
+            raise TimeoutError
+        time.sleep(0.005)
+    return next(running)
+
+
+def _failure(future: Any) -> str:
+    """Return why a task failed."""
+    error = future.exception()
+    if type(error).__name__ == "KilledWorker":
+        return "the workers that worked on it were ended; is their memory full?"
+    return f"internal error: {type(error).__name__}: {' '.join(str(error).split())}"
