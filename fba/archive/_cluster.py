@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from asyncio import CancelledError
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from itertools import islice
@@ -12,8 +14,9 @@ from fba.errors import FbaError, OptionError
 
 CONNECT_SECONDS = 10.0
 """Time within which the scheduler must answer."""
-LOST_SECONDS = 30.0
-"""Time after which a scheduler that does not answer counts as ended."""
+LOST_SECONDS = 10.0
+"""Time after which a scheduler whose connection is lost counts as ended."""
+POLL_SECONDS = 0.01
 CHUNK = 50
 """Items that a worker gets at once: a task costs the scheduler about a millisecond."""
 _AHEAD = 1000
@@ -65,11 +68,15 @@ def for_each_on(
         for part in islice(chunks, _AHEAD):
             hand_out(part)
         while given:
-            future = _next(running, client, missing, address)
+            future = _next(running, client)
+            outcomes = None if future is None else _outcomes(future)
+            if future is None or outcomes is None:
+                raise FbaError(
+                    f"the scheduler {address} has ended: {missing} of the files are missing; start it again, "
+                    "and the same command, which goes on where it stopped"
+                )
             part = given.pop(future)
-            failure = None if future.status == "finished" else _failure(future)
-            if failure is None:
-                outcomes = future.result()
+            if isinstance(outcomes, list):
                 missing -= len(outcomes)
                 yield from outcomes
             elif len(part) > 1:
@@ -77,7 +84,7 @@ def for_each_on(
                     hand_out([item])
             else:
                 missing -= 1
-                yield Outcome(part[0], None, failure)
+                yield Outcome(part[0], None, outcomes)
             for following in islice(chunks, 1):
                 hand_out(following)
     finally:
@@ -85,40 +92,31 @@ def for_each_on(
             client.close(timeout=CONNECT_SECONDS)
 
 
-def _next(running: Any, client: Any, missing: int, address: str) -> Any:
-    """Return the next future that is done. Raises FbaError if the scheduler has ended."""
-    waited = 0.0
-    while True:
-        try:
-            future = next_within(running, 1.0)
-        except TimeoutError:
-            waited = 0.0 if client.status == "running" else waited + 1.0
-            if waited < LOST_SECONDS:
-                continue
-            future = None
-        if future is None or future.status in ("cancelled", "lost"):
-            raise FbaError(
-                f"the scheduler {address} has ended: {missing} of the files are missing; start it again, and "
-                "the same command, which goes on where it stopped"
-            )
-        return future
-
-
-def next_within(running: Any, seconds: float) -> Any:
-    """Return the next future of an `as_completed`; TimeoutError if none is done in time."""
-    import time
-
-    end = time.monotonic() + seconds
-    while running.is_empty():
-        if time.monotonic() > end:
-            raise TimeoutError
-        time.sleep(0.005)
+def _next(running: Any, client: Any) -> Any:
+    """Return the next future of an `as_completed` that is done; None if the scheduler has ended."""
+    lost: float | None = None
+    while not running.has_ready():
+        time.sleep(POLL_SECONDS)
+        if client.status == "running":
+            lost = None
+        elif lost is None:
+            lost = time.monotonic()
+        elif time.monotonic() - lost > LOST_SECONDS:
+            return None
     return next(running)
 
 
-def _failure(future: Any) -> str:
-    """Return why a task failed."""
-    error = future.exception()
-    if type(error).__name__ == "KilledWorker":
-        return "the workers that worked on it were ended; is their memory full?"
-    return f"internal error: {type(error).__name__}: {' '.join(str(error).split())}"
+def _outcomes(future: Any) -> list[Outcome[Any, Any]] | str | None:
+    """Return the outcomes of a chunk; why its task failed; None if the scheduler has ended."""
+    if future.status == "error":
+        error = future.exception()
+        if type(error).__name__ == "KilledWorker":
+            return "the workers that worked on it were ended; is their memory full?"
+        return f"internal error: {type(error).__name__}: {' '.join(str(error).split())}"
+    if future.status != "finished":
+        return None
+    try:
+        outcomes: list[Outcome[Any, Any]] = future.result(timeout=LOST_SECONDS)
+    except (OSError, TimeoutError, CancelledError):
+        return None
+    return outcomes

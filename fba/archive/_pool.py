@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -24,6 +25,8 @@ _AHEAD = 2
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 
+_one_at_a_time = threading.Lock()
+"""Warnings and standard output are those of a process: a worker of a cluster may have several threads."""
 _stop: Any = None
 """In a process of the pool: the event that is set when it shall take no more items."""
 
@@ -138,7 +141,8 @@ def run_chunk(function: Callable[[Item], Value], items: Sequence[Item]) -> list[
     for item in items:
         if _stop is not None and _stop.is_set():
             break
-        outcomes.append(run_one(function, item))
+        with _one_at_a_time:
+            outcomes.append(run_one(function, item))
     return outcomes
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -55,7 +56,7 @@ def command(
     - is standard input or output. A stream is written as `fba encode` does without options. With --batch, IN
     and OUT are folders, --to names the format, and OUT/conversions.csv lists what was done.
     """
-    given_options = {
+    given_options: dict[str, Any] = {
         "rate": rate, "to": to, "no_clobber": no_clobber, "maps": maps, "given": given, "mark": mark,
         "reading": reading,
     }  # fmt: skip
