@@ -65,6 +65,7 @@ ILLUSTRATIONS = {
     ("docs/capture-live.md", "fba capture livelink --serve 8080 -o face.fba"): SENT,
     ("docs/capture-live.md", "fba serve hello.fba --loop"): "serves until somebody ends it",
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
+    ("docs/cluster.md", "dask scheduler --host 10.0.0.1"): "needs several machines",
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "./dev bounds"): "takes hours; .ci/run runs a part, tests/fuzz the command",
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",

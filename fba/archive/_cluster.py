@@ -69,7 +69,7 @@ def for_each_on(
             hand_out(part)
         while given:
             future = _next(running, client)
-            outcomes = None if future is None else _outcomes(future)
+            outcomes = None if future is None else _outcomes(future, client)
             if future is None or outcomes is None:
                 raise FbaError(
                     f"the scheduler {address} has ended: {missing} of the files are missing; start it again, "
@@ -106,17 +106,22 @@ def _next(running: Any, client: Any) -> Any:
     return next(running)
 
 
-def _outcomes(future: Any) -> list[Outcome[Any, Any]] | str | None:
+def _outcomes(future: Any, client: Any) -> list[Outcome[Any, Any]] | str | None:
     """Return the outcomes of a chunk; why its task failed; None if the scheduler has ended."""
-    if future.status == "error":
-        error = future.exception()
-        if type(error).__name__ == "KilledWorker":
-            return "the workers that worked on it were ended; is their memory full?"
-        return f"internal error: {type(error).__name__}: {' '.join(str(error).split())}"
-    if future.status != "finished":
-        return None
-    try:
-        outcomes: list[Outcome[Any, Any]] = future.result(timeout=LOST_SECONDS)
-    except (OSError, TimeoutError, CancelledError):
-        return None
-    return outcomes
+    while client.status == "running" and future.status != "cancelled":
+        try:
+            if future.status == "error":
+                error = future.exception(timeout=LOST_SECONDS)
+                if isinstance(error, CancelledError):
+                    return None
+                if type(error).__name__ == "KilledWorker":
+                    return "the workers that worked on it were ended; is their memory full?"
+                return f"internal error: {type(error).__name__}: {' '.join(str(error).split())}"
+            outcomes: list[Outcome[Any, Any]] = future.result(timeout=LOST_SECONDS)
+        except CancelledError:
+            return None
+        except (OSError, TimeoutError):  # the worker that had it has ended, and another does it again
+            time.sleep(POLL_SECONDS)
+        else:
+            return outcomes
+    return None
