@@ -42,8 +42,7 @@ def import_pyarrow() -> Any:
         import pyarrow.parquet
     except ImportError:
         raise FbaError(
-            "archives are Parquet files, which the package pyarrow reads and writes: pip install "
-            '"mpeg4-fba[archive]"'
+            'the package pyarrow reads and writes archives: pip install "mpeg4-fba[archive]"'
         ) from None
     return pyarrow
 

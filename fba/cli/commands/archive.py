@@ -90,10 +90,10 @@ class _Labels:
     "archive",
     cls=Group,
     epilog=examples(
-        "fba archive make takes --folders subject,emotion -o archive",
-        "fba archive info archive",
-        "fba archive index archive",
-        'fba archive query archive "blinks > 10 and seconds < 60"',
+        "fba archive make takes/ --folders subject,emotion -o archive",
+        "fba archive info archive/",
+        "fba archive index archive/",
+        'fba archive query archive/ "blinks > 10 and seconds < 60"',
     ),
 )
 def command() -> None:
@@ -104,9 +104,9 @@ def command() -> None:
     "make",
     short_help="Make an archive of the files in folders, or add to it.",
     epilog=examples(
-        "fba archive make takes -o archive",
-        "fba archive make takes --folders subject,emotion --tolerance 0.5mm -o archive",
-        "fba archive make streams --table labels.csv --sound inside -o archive",
+        "fba archive make takes/ -o archive",
+        "fba archive make takes/ --folders subject,emotion --tolerance 0.5mm -o archive",
+        "fba archive make streams/ --table labels.csv --sound inside -o archive",
     ),
 )
 @click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, type=options.ExistingPath())
@@ -187,7 +187,7 @@ def print_failures(failed: Iterable[tuple[str, str]]) -> None:
         click.echo("\n".join(table_lines(["failed", "why"], rows)))
 
 
-@command.command("info", epilog=examples("fba archive info archive"))
+@command.command("info", epilog=examples("fba archive info archive/"))
 @click.argument("folder", metavar="DIR", type=ARCHIVE)
 @with_options
 def info_command(folder: Path, as_json: bool = options.json_option) -> None:
@@ -213,7 +213,7 @@ def info_command(folder: Path, as_json: bool = options.json_option) -> None:
 @command.command(
     "extract",
     epilog=examples(
-        "fba archive extract archive -o streams", "fba archive extract archive anna/joy/take1 -o streams"
+        "fba archive extract archive/ -o streams", "fba archive extract archive/ anna/joy/take1 -o streams"
     ),
 )
 @click.argument("folder", metavar="DIR", type=ARCHIVE)
@@ -238,7 +238,7 @@ def extract_command(
     click.echo(f"{target}: {count} files")
 
 
-@command.command("verify", epilog=examples("fba archive verify archive"))
+@command.command("verify", epilog=examples("fba archive verify archive/"))
 @click.argument("folder", metavar="DIR", type=ARCHIVE)
 @with_options
 def verify_command(folder: Path, jobs: int | None = jobs_option, as_json: bool = options.json_option) -> None:
@@ -263,7 +263,7 @@ def verify_command(folder: Path, jobs: int | None = jobs_option, as_json: bool =
         raise click.exceptions.Exit(1)
 
 
-@command.command("index", epilog=examples("fba archive index archive"))
+@command.command("index", epilog=examples("fba archive index archive/"))
 @click.argument("folder", metavar="DIR", type=ARCHIVE)
 @with_options
 def index_command(folder: Path, jobs: int | None = jobs_option) -> None:
@@ -289,8 +289,8 @@ def index_command(folder: Path, jobs: int | None = jobs_option) -> None:
 @command.command(
     "query",
     epilog=examples(
-        'fba archive query archive "blinks > 10 and seconds < 60"',
-        "fba archive query archive \"labels['emotion'] = 'joy'\" --columns name,seconds --sort -seconds",
+        'fba archive query archive/ "blinks > 10 and seconds < 60"',
+        "fba archive query archive/ \"labels['emotion'] = 'joy'\" --columns name,seconds --sort -seconds",
     ),
 )
 @click.argument("folder", metavar="DIR", type=ARCHIVE)

@@ -33,7 +33,7 @@ from fba.source import naming_file
         "fba convert walk.bap walk.bvh --joints moving",
         "fba convert both.fba person.glb --model head.glb",
         "fba convert walk.bvh - --to bap | less",
-        "fba convert --batch captures streams --to fba --jobs 4",
+        "fba convert --batch captures/ streams/ --to fba --jobs 4",
     ),
 )
 @click.argument("source", metavar="IN", type=BatchInput())
