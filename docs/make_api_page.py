@@ -15,7 +15,7 @@ ROOMS = (
     "fba.face", "fba.face.importers", "fba.face.authoring", "fba.face.calibration", "fba.face.checks",
     "fba.face.learning", "fba.body", "fba.body.gait", "fba.capture", "fba.capture.markers",
     "fba.capture.points", "fba.capture.virtual_markers", "fba.emotion", "fba.persona", "fba.live",
-    "fba.player", "fba.serving",
+    "fba.player", "fba.serving", "fba.archive",
 )  # fmt: skip
 """Packages and modules whose `__all__` users may rely on."""
 START = """# Public names

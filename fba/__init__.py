@@ -15,6 +15,7 @@ TYPE_CHECKING = False  # as typing has it, whose import takes longer than all of
 if TYPE_CHECKING:
     from typing import Any
 
+    from fba import archive as archive
     from fba import body, capture, emotion, face
     from fba import carriage as carriage
     from fba import codec as codec
@@ -60,8 +61,8 @@ _NAMES = {
 }  # fmt: skip
 """Public names by the module that they are imported from."""
 _MODULES = (
-    "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live", "parameters", "persona",
-    "planning", "player", "serving",
+    "archive", "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live", "parameters",
+    "persona", "planning", "player", "serving",
 )  # fmt: skip
 
 __all__ = [

@@ -87,6 +87,7 @@ fba.formats.face_tables
 fba.formats.avatar
 fba.live._protocols
 fba.live
+fba.archive
 fba.persona.points
 fba.persona.recognition
 fba.persona

@@ -72,6 +72,7 @@ ILLUSTRATIONS = {
     ): "watches a network; tests/carriage runs tshark",
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/carriage.md", "fba play hello.fba.mp4"): WINDOW,
+    ("docs/cluster.md", "dask scheduler --host 10.0.0.1"): "needs several machines",
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "./dev bounds"): "takes hours; .ci/run runs a part, tests/fuzz the command",
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",

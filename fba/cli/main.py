@@ -30,6 +30,7 @@ _COMMANDS = {
     "export": "Make a page that plays files in any browser, without a network.",
     "serve": "Show files, or a stream while it arrives, in browsers.",
     "render": "Render a file to a picture or a video, without a window.",
+    "archive": "Keep many performances in a few Parquet files, draw windows from them, search them.",
     "verify": "Check FBA streams for damage, and compute digests of their values.",
     "stats": "Show where the bits of FBA streams go.",
     "conformance": "Check this codec, or another program, against test vectors.",

@@ -99,11 +99,12 @@ def table_lines(
 class Progress:
     """A progress bar on standard error, if that is a terminal; for a `with` statement.
 
-    total: number of steps. While it is None, only the seconds so far are shown.
+    total: number of steps. While it is None, only the seconds so far are shown. unit: of the steps, "files";
+    then their number in a second is shown, too.
     """
 
-    def __init__(self, label: str, total: int | None) -> None:
-        self._label, self._total, self._done = label, total, 0
+    def __init__(self, label: str, total: int | None, unit: str = "") -> None:
+        self._label, self._total, self._done, self._unit = label, total, 0, unit
         self._over = Event()
         self._drawing: Thread | None = None
 
@@ -146,4 +147,5 @@ class Progress:
             return f"{self._label}  {timedelta(seconds=int(seconds))}"
         share = min(done / max(total, 1), 1.0)
         left = f"  {timedelta(seconds=round(seconds / share - seconds))} left" if share else ""
-        return f"{self._label}  [{'#' * round(share * BAR_WIDTH):<{BAR_WIDTH}}]  {done}/{total}{left}"
+        rate = f"  {done / seconds:.3g} {self._unit}/s" if self._unit and seconds else ""
+        return f"{self._label}  [{'#' * round(share * BAR_WIDTH):<{BAR_WIDTH}}]  {done}/{total}{rate}{left}"

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import click
 
 from fba.choices import BapTableOrAuto
 from fba.cli import map_options, options, step_tables, writer_options
+from fba.cli.batch import Batch, BatchInput, BatchOutput, convert_folder
 from fba.cli.coding.coded_streams import CodedStream, encode_stream
 from fba.cli.coding.mp4_options import Mp4Options
 from fba.cli.coding.size_options import Size
 from fba.cli.command import Command, examples
 from fba.cli.inputs import ReadFile, Reading, check_clip, has_markers, has_skeleton, read_file
 from fba.cli.option_fields import group, with_options
-from fba.cli.outputs import Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.outputs import Output, Outputs, display_name, find_writer
 from fba.cli.recordings.inputs import Inputs
 from fba.encoder_options import EncoderOptions
 from fba.errors import FormatError
@@ -34,10 +36,11 @@ from fba.source import naming_file
         "fba convert talk.fba talk.fba.mp4 --audio voice.wav",
         "fba convert talk.fba.mp4 back.fba",
         "fba convert walk.bvh - --to bap | less",
+        "fba convert --batch captures/ streams/ --to fba --jobs 4",
     ),
 )
-@click.argument("source", metavar="IN", type=options.EXISTING)
-@click.argument("target", metavar="OUT", type=OutputType())
+@click.argument("source", metavar="IN", type=BatchInput())
+@click.argument("target", metavar="OUT", type=BatchOutput())
 @with_options
 def command(
     source: Path,
@@ -50,12 +53,41 @@ def command(
     mp4: Mp4Options = group(),
     mark: bool | None = options.mark_option,
     reading: Reading = group(bap_steps=options.written_steps_option),
+    batch: Batch = group(),
 ) -> None:
     """Convert a file into another format; the content of IN and the suffix of OUT say which.
 
     - is standard input or output. A stream is written as `fba encode` does without options. Into an MP4 file
-    and out of it, a stream goes as it is.
+    and out of it, a stream goes as it is. With --batch, IN and OUT are folders, --to names the format, and
+    OUT/conversions.csv lists what was done.
     """
+    given_options: dict[str, Any] = {
+        "rate": rate, "to": to, "no_clobber": no_clobber, "maps": maps, "given": given, "mp4": mp4,
+        "mark": mark, "reading": reading,
+    }  # fmt: skip
+    if batch.batch and mp4.sound.audio is not None:
+        raise click.UsageError("--audio goes with one file; with --batch, sounds beside the files are taken")
+    if batch.batch:
+        convert_folder(source, target, to, batch, convert_file, given_options)
+    else:
+        batch.check_alone()
+        convert_file(source, target, **given_options)
+
+
+def convert_file(
+    source: Path,
+    target: Path,
+    *,
+    rate: Fraction | None,
+    to: str | None,
+    no_clobber: bool,
+    maps: map_options.Maps,
+    given: writer_options.WriterOptions,
+    mp4: Mp4Options,
+    mark: bool | None,
+    reading: Reading,
+) -> None:
+    """Convert a file, as the options say. Its result appears whole or not at all."""
     writing = find_writer(target, to)  # raises its errors before anything is read
     mp4.check(writing.name)
     audio = mp4.find_sound(source) if writing.name == "mp4" else None

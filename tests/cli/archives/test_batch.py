@@ -1,0 +1,178 @@
+"""`fba convert --batch`: the same results as one by one, failures, interruptions, and going on."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import archived
+import fba
+from fba.archive import RECORD
+from ready_programs import BIN
+
+Run = Callable[..., tuple[int, str, str]]
+SAMPLES = Path(fba.__file__).parent / "samples"
+
+
+@pytest.fixture
+def captures(tmp_path: Path) -> Path:
+    """Two files that can be read, in folders, and two that cannot."""
+    folder = tmp_path / "captures"
+    (folder / "anna").mkdir(parents=True)
+    shutil.copy(SAMPLES / "hello.fap", folder / "anna")
+    fba.write(folder / "turn.bap", archived.performance(3, face=False, body=True, frames=20))
+    (folder / "bad.fap").write_text("x")
+    (folder / "empty.bvh").write_bytes(b"")
+    return folder
+
+
+def record(folder: Path) -> dict[str, list[str]]:
+    with open(folder / RECORD, newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["source", "output", "key", "bytes", "error"]
+    return {row[0]: row[1:] for row in rows[1:]}
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def test_the_same_as_one_by_one(run: Run, captures: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    code, printed, _ = run("convert", "--batch", captures, out, "--to", "fba", "--jobs", 1)
+    assert code == 1  # two failed
+    assert "2 converted, 0 there before, 2 failed; conversions.csv lists all" in printed
+    assert "bad.fap" in printed
+    assert files(out) == ["anna/hello.fba", RECORD, "turn.fba"]
+    for name in ("anna/hello.fap", "turn.bap"):
+        assert run("convert", captures / name, tmp_path / "one.fba")[0] == 0
+        assert (out / name).with_suffix(".fba").read_bytes() == (tmp_path / "one.fba").read_bytes()
+    rows = record(out)
+    assert rows["anna/hello.fap"][0] == "anna/hello.fba"
+    assert int(rows["turn.bap"][2]) == (out / "turn.fba").stat().st_size
+    assert "expected a header" in rows["bad.fap"][3]
+    assert "is empty" in rows["empty.bvh"][3]
+
+
+def test_what_is_done_is_not_done_again(run: Run, captures: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arguments = ("convert", "--batch", captures, out, "--to", "fba", "--jobs", 1)
+    run(*arguments)
+    times = {name: (out / name).stat().st_mtime_ns for name in files(out)}
+    assert "0 converted, 2 there before" in run(*arguments)[1]
+    assert (out / "turn.fba").stat().st_mtime_ns == times["turn.fba"]
+    (out / "turn.fba").unlink()  # a result that is gone, a source that has changed, other settings
+    assert "1 converted, 1 there before" in run(*arguments)[1]
+    fba.write(captures / "anna" / "hello.fap", archived.performance(1, frames=20))
+    assert "1 converted, 1 there before" in run(*arguments)[1]
+    assert "2 converted, 0 there before" in run(*arguments, "--fps", 10)[1]
+    shutil.copy(SAMPLES / "hello.fap", captures / "bad.fap")
+    assert "1 converted, 2 there before, 1 failed" in run(*arguments, "--fps", 10)[1]
+    assert record(out)["bad.fap"][3] == ""
+
+
+def test_processes_do_the_same(run: Run, captures: Path, tmp_path: Path) -> None:
+    for jobs in (1, 2):
+        run("convert", "--batch", captures, tmp_path / str(jobs), "--to", "bap", "--jobs", jobs)
+    assert files(tmp_path / "1") == files(tmp_path / "2") == [RECORD, "turn.bap"]
+    assert (tmp_path / "1" / "turn.bap").read_bytes() == (tmp_path / "2" / "turn.bap").read_bytes()
+    assert record(tmp_path / "1")["turn.bap"] == record(tmp_path / "2")["turn.bap"]
+    assert "no BAP" in record(tmp_path / "1")["anna/hello.fap"][3]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_an_interruption_leaves_whole_files(run: Run, tmp_path: Path, number: signal.Signals) -> None:
+    captures, out = tmp_path / "captures", tmp_path / "out"
+    captures.mkdir()
+    for name in range(300):
+        shutil.copy(SAMPLES / "hello.fap", captures / f"talk{name:03}.fap")
+    command = [BIN / "fba", "convert", "--batch", captures, out, "--to", "fba", "--jobs", "2"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    ) as process:
+        while not list(out.glob("*.fba")):
+            assert process.poll() is None
+            time.sleep(0.01)
+        os.killpg(process.pid, number)  # as a terminal does
+        process.communicate()
+    assert process.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL)
+    done = list(out.glob("*.fba"))
+    assert 0 < len(done) < 300
+    if number == signal.SIGINT:
+        assert files(out) == sorted([RECORD, *(path.name for path in done)])
+    digests = {fba.codec.digest(fba.read(path)) for path in done}
+    assert len(digests) == 1
+    for name in range(30, 300):  # the rest, in less time
+        (captures / f"talk{name:03}.fap").unlink()
+    code, printed, _ = run("convert", "--batch", captures, out, "--to", "fba", "--jobs", 1)
+    assert code == 0
+    assert "0 failed" in printed
+    assert {f"talk{name:03}.fba" for name in range(30)} <= set(files(out))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--batch", "captures", "out"], "--batch needs the format of the results"),
+        (["--batch", "captures", "captures/out", "--to", "fba"], "neither of them in the other"),
+        (["--batch", "captures", "captures", "--to", "fba"], "neither of them in the other"),
+        (["--batch", "captures/bad.fap", "out", "--to", "fba"], "is a file"),
+        (["--batch", "captures", "captures/bad.fap", "--to", "fba"], "with --batch, give a folder"),
+        (["captures/turn.bap", "out.fba", "--jobs", "2"], "--jobs goes with --batch"),
+        (["captures/turn.bap", "out.fba", "--scheduler", "tcp://a:1"], "--scheduler goes with --batch"),
+        (["captures", "out.fba"], "is a directory"),
+        (
+            ["--batch", "captures", "out", "--to", "fba", "--jobs", "2", "--scheduler", "tcp://a:1"],
+            "--jobs and --scheduler contradict each other",
+        ),
+    ],
+)
+def test_wrong_usage(
+    run: Run, captures: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
+) -> None:
+    monkeypatch.chdir(captures.parent)
+    code, _, err = run("convert", *arguments)
+    assert code == 2
+    assert message in " ".join(err.split())
+    assert not (captures.parent / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [("a,b\n1,2\n", "is no table of conversions"), ("", "is no table of conversions")],
+)
+def test_another_table_in_the_folder(
+    run: Run, captures: Path, tmp_path: Path, content: str, message: str
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / RECORD).write_text(content)
+    code, _, err = run("convert", "--batch", captures, tmp_path / "out", "--to", "fba", "--jobs", 1)
+    assert code == 1
+    assert message in err
+    assert (tmp_path / "out" / RECORD).read_text() == content
+
+
+def test_a_table_that_was_cut_off(run: Run, captures: Path, tmp_path: Path) -> None:
+    arguments = ("convert", "--batch", captures, tmp_path / "out", "--to", "fba", "--jobs", 1)
+    run(*arguments)
+    table = tmp_path / "out" / RECORD
+    table.write_text(table.read_text() + 'turn.bap,"tu')
+    assert "0 converted, 2 there before" in run(*arguments)[1]
+
+
+def test_a_folder_without_anything_to_read(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "notes.md").write_text("x")
+    code, _, err = run("convert", "--batch", tmp_path / "in", tmp_path / "out", "--to", "fba")
+    assert code == 1
+    assert "holds no file of a format that is read" in err
