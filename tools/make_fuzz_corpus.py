@@ -550,7 +550,6 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
     files |= saved(folder)
     files["import"] = {"obj": small_head_obj(), **small_heads()}
     files["import"] |= {
-        "head": files["face"]["face"],
         "gltf": small_head_gltf(),
         "xface": small_head_xface(),
         "fdp": small_head_fdp(),

@@ -23,8 +23,13 @@ def read_corpus(target: Target, folder: Path | None = None) -> list[bytes]:
     if target.random:
         return [bytes(8)]
     folder = CHECKOUT if folder is None else folder
-    pattern = "*/*" if target.folder == "any" else f"{target.folder}/*"
-    files = [path.read_bytes() for path in sorted(folder.glob(pattern)) if path.is_file()]
+    patterns = (
+        ["*/*"]
+        if target.folder == "any"
+        else [f"{name}/*" for name in (target.folder, target.besides) if name]
+    )
+    paths = [path for pattern in patterns for path in sorted(folder.glob(pattern))]
+    files = [path.read_bytes() for path in paths if path.is_file()]
     if not files and target.folder == "stream":
         files = [*small_streams().values(), *doubtful_marks().values(), *long_streams().values()]
     if not files:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 
@@ -19,6 +19,7 @@ class Target:
     check: "module:function"; the function takes the bytes and a folder for files, raises for a finding, and
     returns an `Outcome` otherwise. words: what a mutation inserts. share: of the time, relative to others.
     environment: variables that the process needs. corpus: its folder in the corpus, if that is not `name`.
+    besides: another folder whose files are mutated, too.
     random: inputs are some random bytes, which the check makes something of; there are no files to mutate.
     """
 
@@ -29,6 +30,7 @@ class Target:
     share: int = 1
     environment: Mapping[str, str] = field(default_factory=dict)
     corpus: str = ""
+    besides: str = ""
     random: bool = False
 
     @property
@@ -119,7 +121,7 @@ def targets() -> tuple[Target, ...]:
             b"[virtual_markers]\n", b"vertex = 1, ", b"radius = nan, ", b"fixed = true", b"{ ",
             b" }\n", *_TEXT,
         ),
-        _reader("import", "faces of any kind, imported", *_TEXT),
+        replace(_reader("import", "faces of any kind, imported", *_TEXT), besides="face"),
         _reader("any", "files of any kind, recognised", *_TEXT),
         _reader("cache", "files of the cache of slow results"),
         *(
