@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
-from asyncio import CancelledError
 from collections.abc import Callable, Iterable, Iterator
+from concurrent import futures
 from contextlib import suppress
 from itertools import islice
 from typing import Any, TypeVar
@@ -19,6 +20,8 @@ LOST_SECONDS = 10.0
 POLL_SECONDS = 0.01
 CHUNK = 50
 """Items that a worker gets at once: a task costs the scheduler about a millisecond."""
+_CANCELLED = (asyncio.CancelledError, futures.CancelledError)
+"""Errors of tasks whose scheduler has ended: one or the other, by the version of distributed."""
 _AHEAD = 1000
 """Chunks that are handed out before their results are taken."""
 
@@ -112,13 +115,13 @@ def _outcomes(future: Any, client: Any) -> list[Outcome[Any, Any]] | str | None:
         try:
             if future.status == "error":
                 error = future.exception(timeout=LOST_SECONDS)
-                if isinstance(error, CancelledError):
+                if isinstance(error, _CANCELLED):
                     return None
                 if type(error).__name__ == "KilledWorker":
                     return "the workers that worked on it were ended; is their memory full?"
                 return f"internal error: {type(error).__name__}: {' '.join(str(error).split())}"
             outcomes: list[Outcome[Any, Any]] = future.result(timeout=LOST_SECONDS)
-        except CancelledError:
+        except _CANCELLED:
             return None
         except (OSError, TimeoutError):  # the worker that had it has ended, and another does it again
             time.sleep(POLL_SECONDS)

@@ -70,4 +70,4 @@ def test_the_choice_of_one_of_several_faces(run: Callable[..., Any], tmp_path: P
 def test_an_option_that_no_input_takes(run: Callable[..., Any], tmp_path: Path) -> None:
     said = run("encode", table(tmp_path), "-o", tmp_path / "a.fba", "--spine", "full")
     assert said.code == 2
-    assert "--spine is for BVH, GLTF and SMPL, not for LIVELINK" in said.err
+    assert "--spine is for BVH, GLTF, SMPL and ARF, not for LIVELINK" in said.err
