@@ -34,8 +34,8 @@ class Conversion:
     """A file and what became of it.
 
     source: its name below its folder. output: the same of the result. key: SHA-256 of the file and of the
-    settings. size: bytes of the result. error: why there is none, or "". unchanged: it was there before.
-    warnings: about the file.
+    settings. size: bytes of the result. error: the reason of a failure, or "". unchanged: it was there
+    before. warnings: about the file.
     """
 
     source: str
@@ -73,7 +73,7 @@ def convert_batch(
     The table `conversions.csv` in the folder says what was done, and why what failed did. A file whose
     content and settings are those of the table, and whose result is there, is not converted again: so a batch
     that was interrupted goes on where it stopped. Raises FormatError where the folder or the table cannot be
-    written, and for a table that is none.
+    written, and for another file in place of the table.
     """
     root = Path(folder)
     try:

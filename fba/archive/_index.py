@@ -18,7 +18,7 @@ from fba.errors import FbaError, FormatError, OptionError, did_you_mean, warn
 INDEX = "index.parquet"
 """Name of the index, in the folder of the archive."""
 MARK = b"fba.archive.index"
-VERSION = b"1"
+INDEX_VERSION = b"1"
 MOST_ROW_BYTES = 1 << 30
 """Largest index that is read, in bytes of its columns."""
 QUERY_SECONDS = 60.0
@@ -39,7 +39,7 @@ def _schema() -> Any:
         ("doubtful", pa.list_(span)), ("blinks", whole), ("emotion", text),
         ("emotions", pa.map_(text, number)), ("source", text), ("key", text),
     ]  # fmt: skip
-    return pa.schema(columns, metadata={MARK: VERSION})
+    return pa.schema(columns, metadata={MARK: INDEX_VERSION})
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def index_archive(
 
 
 def _describe_group(item: tuple[Path, int, frozenset[str]]) -> list[tuple[str, dict[str, Any] | None, str]]:
-    """Return the rows of performances of a row group, by name, or why there is none."""
+    """Return the rows of performances of a row group, by name, or the reason of a failure."""
     path, group, keys = item
     found: list[tuple[str, dict[str, Any] | None, str]] = []
     for performance in Archive(path.parent, shards=[path]).group(0, group):
@@ -102,7 +102,7 @@ def _describe_group(item: tuple[Path, int, frozenset[str]]) -> list[tuple[str, d
 
 
 def _read(path: Path) -> Any:
-    """Return an index, as a pyarrow table. Raises FormatError for what is none."""
+    """Return an index, as a pyarrow table. Raises FormatError for another file."""
     pa = import_pyarrow()
     with arrow_errors(path):
         file = pa.parquet.ParquetFile(path, page_checksum_verification=True, pre_buffer=False)
@@ -110,7 +110,7 @@ def _read(path: Path) -> Any:
             found = file.schema_arrow
             groups = [file.metadata.row_group(number) for number in range(file.num_row_groups)]
             size = sum(max(group.total_byte_size, 0) for group in groups)
-            known = (found.metadata or {}).get(MARK) == VERSION and found.equals(_schema())
+            known = (found.metadata or {}).get(MARK) == INDEX_VERSION and found.equals(_schema())
             if not known or size > MOST_ROW_BYTES:
                 raise FormatError(
                     "is no index of this program's version; delete it, and make it with `fba archive index`",
@@ -134,7 +134,7 @@ def query(
     descending. limit: most rows.
 
     The condition sees the index alone: it can write no file, read no other, and load no extension. Raises
-    OptionError for a condition that is none, or takes too much time or memory, and for unknown columns;
+    OptionError for what is no condition, or takes too much time or memory, and for unknown columns;
     FormatError without an index; FbaError without the packages pyarrow and duckdb. Warns (FbaWarning) if the
     archive has performances that the index lacks.
     """

@@ -20,7 +20,7 @@ from fba.parameters import BAP_STEP_TABLES
 
 MARK = b"fba.archive"
 """Key of the metadata of a shard; its value is the version of the columns."""
-VERSION = b"1"
+SHARD_VERSION = b"1"
 PATTERN = "shard-*.parquet"
 GROUP_BYTES = 1 << 20
 """Bytes of streams, and of sounds, from which a new row group begins: what a random window reads at once."""
@@ -59,7 +59,7 @@ def schema() -> Any:
         ("fapu", pa.struct([(unit, number) for unit in UNITS])), ("digest", text),
         ("sound_name", text), ("sound", pa.binary()), ("source", text), ("key", text),
     ]  # fmt: skip
-    return pa.schema(columns, metadata={MARK: VERSION})
+    return pa.schema(columns, metadata={MARK: SHARD_VERSION})
 
 
 def _cells(performance: Performance) -> dict[str, Any]:
@@ -280,10 +280,10 @@ def _opened(path: Path) -> Any:
             path=path,
         )
     version = found.metadata[MARK]
-    if version != VERSION:
+    if version != SHARD_VERSION:
         raise FormatError(
             f"is a shard of version {version.decode('ascii', 'replace')[:20]}; this program reads version "
-            f"{VERSION.decode()}; install a newer one",
+            f"{SHARD_VERSION.decode()}; install a newer one",
             path=path,
         )
     for column in wanted:

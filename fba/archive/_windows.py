@@ -131,7 +131,7 @@ class Windows(Sequence[Float32]):
         return places, counts
 
     def _count(self, frames: int, rate: str) -> int:
-        """Return the number of windows of a performance of so many frames at a rate."""
+        """Return the number of windows of a performance with this number of frames at a rate."""
         if self.rate is not None and frames:
             try:
                 frames = int((frames - 1) * self.rate / Fraction(rate)) + 1

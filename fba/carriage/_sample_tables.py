@@ -102,7 +102,7 @@ def _read_sizes(box: Box, limits: Limits) -> Int64:
 
 
 def _read_durations(box: Box, count: int) -> Int64:
-    """Return the duration of each of so many samples, from a box `stts`."""
+    """Return the duration of each of `count` samples, from a box `stts`."""
     counts, durations = box.table(8, box.read("I", 4)[0], "u4", "u4")
     if int(counts.sum()) != count:
         raise box.broken(

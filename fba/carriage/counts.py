@@ -14,7 +14,7 @@ MOST_REASONS = 20
 class Counts:
     """Counts of packets and planes.
 
-    packets, bytes: that came. refused: packets that are none of this stream, by reason. other_senders:
+    packets, bytes: that came. refused: packets that do not belong to this stream, by reason. other_senders:
     packets of other senders than the first. lost, late, doubled, reordered: packets, by their numbers.
     senders: that followed each other. planes: passed on. held: planes that came behind a loss and were left
     out. damaged: planes that could not be decoded, left out. gaps: times that the pose was held because

@@ -192,7 +192,7 @@ class PayloadReader:
 def split_start_codes(data: bytes) -> list[Unit]:
     """Return the planes in a part of an elementary stream that begins with a start code.
 
-    Raises FormatError where there is none.
+    Raises FormatError without a start code.
     """
     places = _code_places(data)
     units: list[Unit] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -74,10 +74,12 @@ def convert_folder(
     target: Path,
     to: str | None,
     batch: Batch,
-    convert: Callable[..., None],
-    settings: Mapping[str, Any],
+    convert: Callable[[Path, Path], None],
+    settings: str,
 ) -> None:
-    """Convert a folder of files. convert: converts one, with these settings, as the command does.
+    """Convert a folder of files.
+
+    convert: converts a file, as the command does. settings: text that stands for all its settings.
 
     Exits with 1 if a file failed.
     """
@@ -100,8 +102,8 @@ def convert_folder(
         source, target = outer, inner  # workers may have another folder
         sources = find_sources([source])
     done = convert_batch(
-        sources, target, suffix, partial(_convert_quietly, convert=convert, settings=dict(settings)),
-        settings=repr(sorted(settings.items())), for_each=mapper,
+        sources, target, suffix, partial(_convert_quietly, convert=convert), settings=settings,
+        for_each=mapper,
     )  # fmt: skip
     converted = unchanged = 0
     failed: list[list[str]] = []
@@ -122,9 +124,7 @@ def convert_folder(
         raise click.exceptions.Exit(1)
 
 
-def _convert_quietly(
-    source: Path, target: Path, *, convert: Callable[..., None], settings: Mapping[str, Any]
-) -> None:
+def _convert_quietly(source: Path, target: Path, *, convert: Callable[[Path, Path], None]) -> None:
     """Convert a file as the command does, without what it prints. Runs in other processes."""
     from fba.cli.main import group
 
@@ -138,6 +138,6 @@ def _convert_quietly(
             contextlib.redirect_stdout(silent),
             contextlib.redirect_stderr(silent),
         ):
-            convert(source, target, **settings)
+            convert(source, target)
     except click.ClickException as error:
         raise FormatError(error.format_message(), path=source) from error

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -25,6 +26,20 @@ from fba.parameters import BAP_STEPS_AUTO
 from fba.source import naming_file
 
 
+@dataclass(frozen=True, kw_only=True)
+class Conversion:
+    """How a file is converted: the options of the command."""
+
+    rate: Fraction | None = options.rate_option("Resample to this frame rate; default: the input's own.")
+    to: str | None = options.to_option
+    no_clobber: bool = options.no_clobber_option
+    maps: map_options.Maps = map_options.map_option
+    given: writer_options.WriterOptions
+    mp4: Mp4Options
+    mark: bool | None = options.mark_option
+    reading: Reading = group(bap_steps=options.written_steps_option)
+
+
 @click.command(
     cls=Command,
     epilog=examples(
@@ -42,71 +57,44 @@ from fba.source import naming_file
 @click.argument("source", metavar="IN", type=BatchInput())
 @click.argument("target", metavar="OUT", type=BatchOutput())
 @with_options
-def command(
-    source: Path,
-    target: Path,
-    rate: Fraction | None = options.rate_option("Resample to this frame rate; default: the input's own."),
-    to: str | None = options.to_option,
-    no_clobber: bool = options.no_clobber_option,
-    maps: map_options.Maps = map_options.map_option,
-    given: writer_options.WriterOptions = group(),
-    mp4: Mp4Options = group(),
-    mark: bool | None = options.mark_option,
-    reading: Reading = group(bap_steps=options.written_steps_option),
-    batch: Batch = group(),
-) -> None:
+def command(source: Path, target: Path, how: Conversion, batch: Batch) -> None:
     """Convert a file into another format; the content of IN and the suffix of OUT say which.
 
     - is standard input or output. A stream is written as `fba encode` does without options. Into an MP4 file
     and out of it, a stream goes as it is. With --batch, IN and OUT are folders, --to names the format, and
     OUT/conversions.csv lists what was done.
     """
-    given_options: dict[str, Any] = {
-        "rate": rate, "to": to, "no_clobber": no_clobber, "maps": maps, "given": given, "mp4": mp4,
-        "mark": mark, "reading": reading,
-    }  # fmt: skip
-    if batch.batch and mp4.sound.audio is not None:
-        raise click.UsageError("--audio goes with one file; with --batch, sounds beside the files are taken")
-    if batch.batch:
-        convert_folder(source, target, to, batch, convert_file, given_options)
-    else:
+    if not batch.batch:
         batch.check_alone()
-        convert_file(source, target, **given_options)
+        convert_file(source, target, how)
+        return
+    if how.mp4.sound.audio is not None:
+        raise click.UsageError("--audio goes with one file; with --batch, sounds beside the files are taken")
+    convert_folder(source, target, how.to, batch, partial(convert_file, how=how), repr(how))
 
 
-def convert_file(
-    source: Path,
-    target: Path,
-    *,
-    rate: Fraction | None,
-    to: str | None,
-    no_clobber: bool,
-    maps: map_options.Maps,
-    given: writer_options.WriterOptions,
-    mp4: Mp4Options,
-    mark: bool | None,
-    reading: Reading,
-) -> None:
-    """Convert a file, as the options say. Its result appears whole or not at all."""
-    writing = find_writer(target, to)  # raises its errors before anything is read
+def convert_file(source: Path, target: Path, how: Conversion) -> None:
+    """Convert a file. Its result appears whole or not at all."""
+    given, mp4, maps, reading = how.given, how.mp4, how.maps, how.reading
+    writing = find_writer(target, how.to)  # raises its errors before anything is read
     mp4.check(writing.name)
     audio = mp4.find_sound(source) if writing.name == "mp4" else None
     read_files = [source, given.model, given.body, audio]
-    outputs = Outputs([Output.of_format("OUT", target, writing)], read_files, no_clobber=no_clobber)
+    outputs = Outputs([Output.of_format("OUT", target, writing)], read_files, no_clobber=how.no_clobber)
     captures = [source] if has_skeleton(source, reading.format) else []
     with_markers = has_markers(source, reading.format)
     bodies_map = maps if given.body is not None and not captures and not with_markers else ()
     joints_of_body = map_options.read_body_joints(bodies_map, given.body, reading.limit)
     extra = writer_options.settings(target, writing, given, joints_of_body)
     check_clip(reading, [source])
-    if mark is not None and writing.name != "fba":
+    if how.mark is not None and writing.name != "fba":
         raise click.UsageError(f"--mark is for streams, and {display_name(target)} becomes none")
     joints = places = None
     if with_markers:
         places = map_options.read_places(maps, [source], reading)
     elif not bodies_map:
         joints = map_options.read_joints(maps, captures, reading)
-    read = read_file(source, reading, rate=rate, capture={"joints": joints, "markers": places})
+    read = read_file(source, reading, rate=how.rate, capture={"joints": joints, "markers": places})
     about = f"{display_name(target)}: {len(read.animation)} frames, {writing.written or writing.description}"
     if writing.name not in ("fba", "mp4"):
         outputs.write_animation(target, read.animation, writing, **extra)
@@ -114,15 +102,15 @@ def convert_file(
         return
     if not len(read.animation):
         raise FormatError("the file holds no frames; a stream needs one", path=source)
-    marked = mark is not False
+    marked = how.mark is not False
     asked = None if reading.bap_steps == BAP_STEPS_AUTO else reading.bap_steps
-    kept = read.stream if rate is None and not reading.salvage else None
+    kept = read.stream if how.rate is None and not reading.salvage else None
     if writing.name == "mp4":
         stream = kept or _encode(read, target, reading.bap_steps, marked=True).data
         data, heard = mp4.write(stream, source, audio, asked, reading.limit)
         outputs.write(target, data)
         outputs.say(about + heard)
-    elif kept is not None and read.format.name == "mp4" and mark is None and asked in (None, read.table):
+    elif kept is not None and read.format.name == "mp4" and how.mark is None and asked in (None, read.table):
         outputs.write(target, kept)
         outputs.say(about)
     else:

@@ -83,7 +83,7 @@ class Recording:
 
 
 def record(recording: Recording, seconds: float | None, face: FaceModel | None, *, play: bool) -> None:
-    """Record a stream to its end, for so many seconds, or until Ctrl-C. play: show it meanwhile."""
+    """Record a stream to its end, for a number of seconds, or until Ctrl-C. play: show it meanwhile."""
     receiver = recording.receiver
     click.echo(f"fba: listening at {receiver.address}", err=True)
     timer = None if seconds is None else threading.Timer(seconds, receiver.stop)
