@@ -70,7 +70,12 @@ def for_each_on(
 
         for part in islice(chunks, _AHEAD):
             hand_out(part)
-        while given:
+        suspects: list[Item] = []
+        alone = False  # whether an item is the only one on the cluster
+        while given or suspects:
+            if not given:
+                alone = True
+                hand_out([suspects.pop()])
             future = _next(running, client)
             outcomes = None if future is None else _outcomes(future, client)
             if future is None or outcomes is None:
@@ -85,6 +90,8 @@ def for_each_on(
             elif len(part) > 1:
                 for item in part:
                     hand_out([item])
+            elif not alone:  # another item on the same workers may have ended them
+                suspects += part
             else:
                 missing -= 1
                 yield Outcome(part[0], None, outcomes)

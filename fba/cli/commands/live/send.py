@@ -45,6 +45,7 @@ class _Stream:
     sdp: Path | None = further_output_option(
         "FILE.sdp", "Description of the session to write, for receivers."
     )
+    no_clobber: bool = options.no_clobber_option
 
 
 @click.command(
@@ -115,7 +116,7 @@ def _send_stream(
     if loop and str(file) == "-":
         raise click.UsageError("--loop repeats a file; standard input (-) comes once")
     written = [] if stream.sdp is None else [Output("--sdp", stream.sdp)]
-    outputs = Outputs(written, [file])
+    outputs = Outputs(written, [file], no_clobber=stream.no_clobber)
     planes = None
     if str(file) != "-":
         planes = live_streams.file_planes(file, reading, period=INTRA_PERIOD, again=True)[0]
