@@ -153,7 +153,11 @@ class SoundFile(Closing):
             if frame.pts is not None and frame.time_base:
                 stated = round(float((frame.pts - begun) * frame.time_base) * self.rate)
             if at is None:
-                at = self._first = stated or 0
+                at, wanted = stated or 0, self._first
+                late = 0 < at - wanted < MAX_PACKET_SAMPLES
+                self._first = wanted if late else at
+                if late:  # samples of the beginning that no decoder gives out: the coder's run-up
+                    yield np.zeros((at - wanted, CHANNELS), dtype=np.int16)
             elif stated is not None and MIN_GAP_SECONDS * self.rate < stated - at < MAX_PACKET_SAMPLES:
                 yield np.zeros((stated - at, CHANNELS), dtype=np.int16)
                 at = stated
