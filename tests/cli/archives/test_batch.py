@@ -89,6 +89,7 @@ def test_processes_do_the_same(run: Run, captures: Path, tmp_path: Path) -> None
     assert "only a face" in record(tmp_path / "1")["anna/hello.fap"][3]
 
 
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_an_interruption_leaves_whole_files(run: Run, tmp_path: Path, number: signal.Signals) -> None:

@@ -31,12 +31,7 @@ LOCAL = "127.0.0.1"
 STREAM = encode_animation(performance(), JOINABLE)[0]
 
 
-@pytest.fixture(autouse=True)
-def interruptible() -> Iterator[None]:
-    """Let programs be interrupted in the background, too, where they ignore Ctrl-C."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
+pytestmark = pytest.mark.usefixtures("interruptible")
 
 
 @contextmanager
