@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Hashable, Iterator
 from fractions import Fraction
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from fba.carriage._joining import StreamJoiner
 from fba.carriage._order import PacketOrder
@@ -23,30 +24,37 @@ _OF_ORDER = ("lost", "late", "doubled", "reordered")
 _NUMBERS, _TICKS = 1 << 16, 1 << 32
 
 
-class PacketReader(Protocol):
-    """Makes a stream of packets."""
+class PacketReader(ABC):
+    """Makes a stream of packets. counts: what came."""
 
     counts: Counts
+    _joiner: StreamJoiner
 
     @property
     def table(self) -> BapTable | None:
         """The table of BAP steps that the headers of the stream name, once it has begun."""
+        return self._joiner.table
 
     @property
     def ended(self) -> bool:
         """Whether the end of the stream came."""
+        return self._joiner.ended
 
     @property
     def holding(self) -> bool:
         """Whether the pose is held, since planes are missing."""
+        return self._joiner.holding
 
     @property
     def due(self) -> float | None:
         """Time at which `settle` has something to return, if no packet comes before; None without."""
+        return None
 
+    @abstractmethod
     def receive(self, data: bytes, sender: Hashable, now: float) -> list[bytes]:
         """Return the parts of the stream, a plane each, that a packet completes; it came now."""
 
+    @abstractmethod
     def settle(self, now: float) -> list[bytes]:
         """Return the parts of the stream that wait no longer for packets before them."""
 
@@ -59,7 +67,7 @@ class _Sender(NamedTuple):
     following: int
 
 
-class RtpReader:
+class RtpReader(PacketReader):
     """Makes a stream of RTP packets.
 
     payload_type: all others are left out. kind, table: see `PayloadReader`. configuration: headers, from a
@@ -94,21 +102,6 @@ class RtpReader:
         self._payloads = PayloadReader(kind, table)
         self._ticks: int | None = None  # of the last packet, beyond 32 bits
         self._base = Fraction(0)  # seconds at tick 0
-
-    @property
-    def table(self) -> BapTable | None:
-        """See `PacketReader`."""
-        return self._joiner.table
-
-    @property
-    def ended(self) -> bool:
-        """See `PacketReader`."""
-        return self._joiner.ended
-
-    @property
-    def holding(self) -> bool:
-        """See `PacketReader`."""
-        return self._joiner.holding
 
     @property
     def due(self) -> float | None:
@@ -201,7 +194,7 @@ class RtpReader:
                 yield part
 
 
-class DatagramReader:
+class DatagramReader(PacketReader):
     """Makes a stream of datagrams without RTP: each holds whole planes, with their start codes.
 
     They have neither numbers nor times: a lost one is not noticed. The first sender is followed; another
@@ -210,25 +203,9 @@ class DatagramReader:
 
     def __init__(self) -> None:
         self.counts = Counts()
-        self.due = None
         self._joiner = StreamJoiner()
         self._sender: Hashable = None
         self._heard = 0.0
-
-    @property
-    def table(self) -> BapTable | None:
-        """See `PacketReader`."""
-        return self._joiner.table
-
-    @property
-    def ended(self) -> bool:
-        """See `PacketReader`."""
-        return self._joiner.ended
-
-    @property
-    def holding(self) -> bool:
-        """See `PacketReader`."""
-        return self._joiner.holding
 
     def receive(self, data: bytes, sender: Hashable, now: float) -> list[bytes]:
         """See `PacketReader`."""
