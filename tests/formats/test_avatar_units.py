@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 import zipfile
 from collections.abc import Callable, Mapping
@@ -108,6 +109,41 @@ def test_containers_of_others_are_read(tmp_path: Path, walk: SkeletonMotion, bin
         > animation.face.values[1, fap_numbers()["open_jaw"] - 1]
     )
     assert animation.face.values[5, fap_numbers()["stretch_l_cornerlip"] - 1] > 0
+
+
+def test_joints_of_further_trees_are_left_out(tmp_path: Path) -> None:
+    """A prop among the joints, whose numbers come before those of the skeleton."""
+    names, parents = ("hat", "hips", "brim", "knee", "ankle"), (None, None, 0, 1, 3)
+    placed = np.tile(np.eye(4), (5, 1, 1))
+    placed[:, 1, 3] = (9.0, 1.0, 0.5, -0.4, -0.3)
+    nodes = [
+        {"id": number, "name": name, "translation": placed[number, :3, 3].tolist()}
+        | ({} if parents[number] is None else {"parent": parents[number]})
+        for number, name in enumerate(names)
+    ]
+    skeletons = [{"id": 0, "joints": list(range(5))}]
+    document = {"preamble": {"signature": "ARF"}, "components": {"nodes": nodes, "skeletons": skeletons}}
+    path = tmp_path / "a.arfz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("arf.json", json.dumps(document))
+        stream = configuration("arf-body-v1") + b"".join(joints(frame, placed) for frame in range(3))
+        archive.writestr("animations/joints.bin", stream)
+    motion = read_motion(path)
+    assert motion.names == ("hips", "knee", "ankle")
+    assert motion.parents.tolist() == [-1, 0, 1]
+    assert motion.world()[1][2, :, 1] == pytest.approx([1.0, 0.6, 0.3], abs=1e-6)
+
+
+def test_many_joints_that_no_unit_mentions_do_not_fill_the_memory(
+    tmp_path: Path, walk: SkeletonMotion
+) -> None:
+    def with_crowd(document: Any) -> None:
+        crowd = [{"id": 1000 + number, "name": f"j{number}", "parent": 0} for number in range(60_000)]
+        document["components"]["nodes"] += crowd
+        document["components"]["skeletons"][0]["joints"] += [node["id"] for node in crowd]
+
+    with pytest.raises(LimitError, match="bytes of memory"):
+        fba.read(container(tmp_path / "a.arfz", walk, seed=1, bind=False, change=with_crowd))
 
 
 GOOD = configuration() + weights(0, {0: 0.5}) + weights(1, {0: 0.5})

@@ -48,6 +48,8 @@ ON_FRAME = 1e-4
 MAX_STRETCH = 0.01
 """Share of the skeleton's size by which a joint may move relative to its parent without a warning."""
 MIN_SCALE = 1e-6
+MATRIX_BYTES = 400
+"""Memory, in bytes, that a joint in a unit takes: its matrix to the world, and turns made of it."""
 
 
 def sniff(head: bytes, suffix: str) -> bool:
@@ -251,8 +253,9 @@ class _Person:
             if not np.isfinite(track.values[:, : len(names)]).any():
                 return None
         order = _with_root_first(parents_first(parents), parents, self.path)
-        places = np.argsort(order)
-        above = np.array([-1 if parents[joint] < 0 else places[parents[joint]] for joint in order])
+        places = {joint: place for place, joint in enumerate(order)}
+        above = np.array([places.get(int(parents[joint]), -1) for joint in order])
+        rate, rows = self._frames(track)
         world = _world(track, self.avatar.rest, order, above, parents)
         rest = self.avatar.rest[order]
         turned = rotations.quaternions(
@@ -265,7 +268,6 @@ class _Person:
             local[:, joint] = rotations.multiply(turned[:, above[joint]] * [1, -1, -1, -1], turned[:, joint])
             offsets[joint] -= rest[above[joint], :3, 3]
         local /= np.linalg.norm(local, axis=-1, keepdims=True)
-        rate, rows = self._frames(track.times)
         positions = world[:, 0, :3, 3]
         motion = SkeletonMotion(
             tuple(names[joint] for joint in order), above, offsets, rotations.interpolate(local, *rows),
@@ -275,18 +277,16 @@ class _Person:
         self._warn_of_stretching(replace(motion, rotations=local, positions=positions), world)
         return motion if self.face is None else replace(motion, face=self.faps)
 
-    def _frames(self, times: Float64) -> tuple[Fraction, tuple[Int64, Int64, Float64]]:
-        """Return the rate, and for each frame the units before and after it, and the weight of the latter."""
-        times = times - times[0]
+    def _frames(self, track: UnitTrack) -> tuple[Fraction, tuple[Int64, Int64, Float64]]:
+        """Return the rate, and for each frame the units before and after it, and the weight of the latter.
+
+        Raises LimitError where the frames, or the matrices of all joints in all units, are too many.
+        """
+        times, joints, source = track.times - track.times[0], len(self.avatar.joints), track.values.nbytes
+        self.limits.check_bytes(MATRIX_BYTES * len(times) * joints, "the motion", source=source)
         rate = find_rate(times)
         at = frame_numbers(times, rate, self.limits) / float(rate)
-        SkeletonMotion.check_memory(
-            self.limits,
-            len(at),
-            len(self.avatar.joints),
-            "the motion",
-            self.units.joints.values.nbytes,  # type: ignore[union-attr]
-        )
+        SkeletonMotion.check_memory(self.limits, len(at), joints, "the motion", source)
         before = np.clip(
             np.searchsorted(times, at + ON_FRAME / float(rate), side="right") - 1, 0, len(times) - 1
         )
