@@ -99,7 +99,7 @@ class _Coding:
         return self.preset == "compact"
 
     def recorder(self, targets: list[Target], *, served: bool) -> StreamRecorder:
-        """Return the encoder that writes frames to the targets. served: whether viewers come and go."""
+        """Return the encoder that writes frames to the targets. served: for viewers who come later."""
         from fba.live import StreamRecorder
 
         return StreamRecorder(
@@ -165,6 +165,7 @@ class _Request:
         "fba capture vmc -o person.fba",
         "fba capture livelink --serve 8080",
         "fba capture rtp://0.0.0.0:5004 -o talk.fba",
+        "fba capture livelink -o - | fba send - --live rtp://192.168.0.20:5004",
     ),
 )
 @click.argument("kind", type=_KindType(), metavar=f"[{'|'.join(KINDS)}|{ADDRESSES}|FILE{DESCRIPTION}]")
@@ -235,7 +236,8 @@ def _capture(
     from fba.live import Capture, Receiver
 
     network = request.network
-    recorder = request.coding.recorder(targets, served=request.serve is not None)
+    piped = request.output == STANDARD and request.coding.bit_rate is None  # to `fba send -`, for example
+    recorder = request.coding.recorder(targets, served=piped or request.serve is not None)
     capture = Capture(
         kind, recorder.push, sender=network.sender, rate=request.rate, swap=request.swap,
         neutral=request.neutral, say=lambda text: click.echo(f"fba: {text}", err=True),
