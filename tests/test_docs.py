@@ -74,7 +74,10 @@ ILLUSTRATIONS = {
     ): "watches a network; tests/carriage runs tshark",
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/carriage.md", "fba play hello.fba.mp4"): WINDOW,
-    ("docs/archives.md", 'pip install "mpeg4-fba[archive]" s3fs'): STORAGE,
+    (
+        "docs/archives.md",
+        "fba archive make streams/ --folders subject,emotion -o s3://training/faces",
+    ): STORAGE,
     ("docs/cluster.md", "dask scheduler --host 10.0.0.1"): "needs several machines",
     ("docs/cluster.md", "fba archive make streams/ -o s3://training/faces"): STORAGE,
     ("docs/develop.md", "./dev test"): CHECKOUT,
