@@ -165,7 +165,6 @@ class _Request:
         "fba capture vmc -o person.fba",
         "fba capture livelink --serve 8080",
         "fba capture rtp://0.0.0.0:5004 -o talk.fba",
-        "fba capture livelink -o - | fba send - --live rtp://192.168.0.20:5004",
     ),
 )
 @click.argument("kind", type=_KindType(), metavar=f"[{'|'.join(KINDS)}|{ADDRESSES}|FILE{DESCRIPTION}]")

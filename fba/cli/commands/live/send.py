@@ -54,7 +54,7 @@ class _Stream:
         "fba send talk.fba rtp://192.168.0.20:5004",
         "fba send talk.fba rtp://239.1.2.3:5004 --sdp talk.sdp --loop",
         "fba send talk.fba tcp://192.168.0.20:5004",
-        "fba capture livelink -o - | fba send - --live rtp://192.168.0.20:5004",
+        "fba send - --live rtp://192.168.0.20:5004",
         "fba send talk.fba 127.0.0.1:11111 --name Anna --loop",
     ),
 )
