@@ -35,6 +35,13 @@ def draw_recording(session: Session) -> float:
     return 40.0 + float(imgui.calc_text_size(text).x)
 
 
+def live_message(session: Session) -> str:
+    """Return what a live stream says of itself, such as that a part was lost; "" where there is none."""
+    scene = session.scene
+    animation: object = scene.animation if isinstance(scene, Scene) else None
+    return animation.message if isinstance(animation, LiveAnimation) else ""
+
+
 def draw_name(session: Session, display: tuple[float, float], taken: float, room: float) -> None:
     """Draw the name and rate of the file in the upper left corner.
 
@@ -45,9 +52,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
     to = imgui.get_background_draw_list()
     x, y = EDGE + 4 + taken, EDGE + 7
     name = session.source.name or session.scene.title
-    scene = session.scene
-    animation: object = scene.animation if isinstance(scene, Scene) else None
-    facts = (animation.message if isinstance(animation, LiveAnimation) else "") or _facts(session)
+    facts = live_message(session) or _facts(session)
     if imgui.calc_text_size(name + facts).x + x > room:
         facts = ""
     while name and imgui.calc_text_size(name).x + x > room:
