@@ -1,0 +1,82 @@
+"""Silhouettes of meshes, drawn by the processor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Bool, Float64, Floating, Integer
+from fba.compiled import compiled
+from fba.errors import ModelError
+from fba.outlines._mask import SIDE
+
+DISTANCE = 4.0
+"""Distance of the camera from the middle of the figure, in radii of the sphere around it."""
+
+
+@dataclass(frozen=True)
+class View:
+    """The side from which a figure is seen.
+
+    yaw: degrees, 0 from its front, 90 from its left, -90 from its right. pitch: degrees, 90 from above.
+    """
+
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+    @property
+    def axes(self) -> Float64:
+        """Rows (3, 3): to the right, up and towards the camera, in the figure's axes."""
+        yaw, pitch = math.radians(self.yaw), math.radians(self.pitch)
+        right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
+        back = np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
+        return np.stack([right, np.cross(back, right), back])
+
+
+def draw_silhouette(
+    vertices: Floating, triangles: Integer, view: View = View(), *, side: int = SIDE  # noqa: B008 - immutable
+) -> Bool:
+    """Return the mask (H, W) of a mesh: `side` pixels along its longer side, and a margin of 2 pixels.
+
+    vertices: (V, 3), +x its left, +y up, +z forward; any unit. triangles: (F, 3). The camera is 4 radii of
+    the mesh from its middle. Raises ModelError for a mesh without triangles or without size.
+    """
+    used = vertices[np.unique(triangles)].astype(np.float64)
+    if not len(used) or not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
+        raise ModelError("a silhouette needs a mesh of finite vertices, with triangles and some size")
+    middle = (used.min(axis=0) + used.max(axis=0)) / 2
+    radius = float(np.linalg.norm(used - middle, axis=1).max())
+    seen = (vertices.astype(np.float64) - middle) @ view.axes.T / radius
+    flat = seen[:, :2] * (DISTANCE / (DISTANCE - seen[:, 2:]))
+    low, high = (edge(flat[np.unique(triangles)], axis=0) for edge in (np.min, np.max))
+    size = np.maximum((high - low) * side / float((high - low).max()), 1.0)
+    places = (flat - low) * side / float((high - low).max())
+    places[:, 1] = size[1] - places[:, 1]
+    mask = np.zeros(np.ceil(size).astype(int)[::-1], dtype=np.bool_)
+    fill_triangles(places, np.ascontiguousarray(triangles, dtype=np.int32), mask)
+    return np.pad(mask, 2)
+
+
+@compiled
+def fill_triangles(places, triangles, mask):  # type: ignore[no-untyped-def]
+    """Set all pixels of a mask (H, W) whose centre lies in a triangle. places: (V, 2), x and y in pixels."""
+    height, width = mask.shape
+    for number in range(triangles.shape[0]):
+        x0, y0 = places[triangles[number, 0], 0], places[triangles[number, 0], 1]
+        x1, y1 = places[triangles[number, 1], 0], places[triangles[number, 1], 1]
+        x2, y2 = places[triangles[number, 2], 0], places[triangles[number, 2], 1]
+        left = max(int(np.ceil(min(x0, x1, x2) - 0.5)), 0)
+        right = min(int(np.floor(max(x0, x1, x2) - 0.5)), width - 1)
+        top = max(int(np.ceil(min(y0, y1, y2) - 0.5)), 0)
+        bottom = min(int(np.floor(max(y0, y1, y2) - 0.5)), height - 1)
+        for row in range(top, bottom + 1):
+            y = row + 0.5
+            for column in range(left, right + 1):
+                x = column + 0.5
+                a = (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)
+                b = (x2 - x1) * (y - y1) - (y2 - y1) * (x - x1)
+                c = (x0 - x2) * (y - y2) - (y0 - y2) * (x - x2)
+                if (a >= 0 and b >= 0 and c >= 0) or (a <= 0 and b <= 0 and c <= 0):
+                    mask[row, column] = True
