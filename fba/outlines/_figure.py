@@ -41,8 +41,8 @@ class Figure:
     """A body with a face on it, or a head alone, whose vertices FAPs and BAPs move.
 
     body: None for a head alone. A body without a place for a face keeps its own head. triangles: int32
-    (F, 3), of all parts that are shown. joints: int32 (V,), the joint of the body that carries each vertex
-    most; empty for a head alone.
+    (F, 3), of all parts that are shown, over their vertices. joints: int32 (V,), the joint of the body that
+    carries each vertex most; zeros for a head alone.
     """
 
     def __init__(self, model: FaceModel, body: BodyModel | None) -> None:
@@ -50,18 +50,21 @@ class Figure:
         self._deformer = Deformer(model)
         self._solver = None if body is None else BapSolver(body.skeleton)
         self._head = None if body is None or body.eyes is None else _attach(model, body)
-        self.triangles, self.joints = _surface(model, body, self._head)
+        triangles, joints = _surface(model, body, self._head)
+        self._rows, corners = np.unique(triangles, return_inverse=True)
+        self.triangles: Int32 = corners.reshape(-1, 3).astype(np.int32)
+        self.joints: Int32 = joints[self._rows]
 
     def vertices(self, faps: Int32, baps: Int32) -> Float32:
         """Return the vertices (V, 3), metres, for FAPs (68,), all of them low-level, and BAPs (296,)."""
         if self.body is None or self._solver is None:
-            return self._deformer(faps)
+            return self._deformer(faps)[self._rows]
         matrices: Float64 = self._solver.pose(baps)
         if self._head is None:
-            return self.body.skin(matrices)
+            return self.body.skin(matrices)[self._rows]
         turned = self._head.matrices(matrices, self._deformer.head_matrices(faps))
         face = self._head.skin(self._deformer.local(faps), turned)
-        return np.concatenate([self.body.skin(turned), face])
+        return np.concatenate([self.body.skin(turned), face])[self._rows]
 
 
 def _attach(model: FaceModel, body: BodyModel) -> AttachedHead:
@@ -73,7 +76,7 @@ def _attach(model: FaceModel, body: BodyModel) -> AttachedHead:
 def _surface(model: FaceModel, body: BodyModel | None, head: AttachedHead | None) -> tuple[Int32, Int32]:
     """Return the triangles that are shown, and the joint of each vertex, as of `Figure`."""
     if body is None:
-        return model.triangles, np.empty(0, dtype=np.int32)
+        return model.triangles, np.zeros(len(model.vertices), dtype=np.int32)
     left_out = () if head is None else ("head", "neck") if head.brings_neck else ("head",)
     triangles, first = [], 0
     for part in body.parts:

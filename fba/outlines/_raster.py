@@ -1,4 +1,8 @@
-"""Silhouettes of meshes, drawn by the processor."""
+"""Silhouettes of meshes, drawn by the processor.
+
+Bounds: `draw_silhouette` checks the triangles against the vertices, and `fill_triangles` cuts every triangle
+at the edges of the mask.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,8 @@ from fba.outlines._mask import SIDE
 
 DISTANCE = 4.0
 """Distance of the camera from the middle of the figure, in radii of the sphere around it."""
+SIDES = ("front", "front left", "left", "back left", "back", "back right", "right", "front right")
+"""Sides of a figure at yaws of 0, 45, 90 degrees and so on."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,12 @@ class View:
     pitch: float = 0.0
 
     @property
+    def side(self) -> str:
+        """The nearest of eight sides in words, "front left", and the angle from above where there is one."""
+        name = SIDES[round(self.yaw / 45) % 8]
+        return f"{name}, {self.pitch:+g} degrees" if self.pitch else name
+
+    @property
     def axes(self) -> Float64:
         """Rows (3, 3): to the right, up and towards the camera, in the figure's axes."""
         yaw, pitch = math.radians(self.yaw), math.radians(self.pitch)
@@ -35,27 +47,33 @@ class View:
         return np.stack([right, np.cross(back, right), back])
 
 
-def draw_silhouette(
-    vertices: Floating, triangles: Integer, view: View = View(), *, side: int = SIDE  # noqa: B008 - immutable
-) -> Bool:
+def draw_silhouette(vertices: Floating, triangles: Integer, view: View = View(), *, side: int = SIDE) -> Bool:
     """Return the mask (H, W) of a mesh: `side` pixels along its longer side, and a margin of 2 pixels.
 
-    vertices: (V, 3), +x its left, +y up, +z forward; any unit. triangles: (F, 3). The camera is 4 radii of
-    the mesh from its middle. Raises ModelError for a mesh without triangles or without size.
+    vertices: (V, 3), all of them used; +x its left, +y up, +z forward; any unit. triangles: (F, 3). The
+    camera is 4 radii of the mesh from its middle. Raises ModelError for a mesh without triangles, with
+    triangles of other vertices, without size, or edge-on.
     """
-    used = vertices[np.unique(triangles)].astype(np.float64)
-    if not len(used) or not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
-        raise ModelError("a silhouette needs a mesh of finite vertices, with triangles and some size")
-    middle = (used.min(axis=0) + used.max(axis=0)) / 2
-    radius = float(np.linalg.norm(used - middle, axis=1).max())
-    seen = (vertices.astype(np.float64) - middle) @ view.axes.T / radius
+    whole = vertices.astype(np.float64)
+    if not len(triangles) or not np.isfinite(whole).all():
+        raise ModelError("a silhouette needs a mesh with triangles, and finite vertices")
+    if triangles.min() < 0 or triangles.max() >= len(whole):
+        raise ModelError(f"the triangles name vertices beyond the {len(whole)} of the mesh")
+    whole -= (whole.min(axis=0) + whole.max(axis=0)) / 2
+    radius = math.sqrt(float(np.einsum("vk,vk->v", whole, whole).max()))
+    if radius == 0:
+        raise ModelError("the mesh has no size: all its vertices coincide")
+    seen = whole @ (view.axes.T / radius)
     flat = seen[:, :2] * (DISTANCE / (DISTANCE - seen[:, 2:]))
-    low, high = (edge(flat[np.unique(triangles)], axis=0) for edge in (np.min, np.max))
-    size = np.maximum((high - low) * side / float((high - low).max()), 1.0)
-    places = (flat - low) * side / float((high - low).max())
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    scale = side / max(float((high - low).max()), 1e-9)
+    size = np.maximum((high - low) * scale, 1.0)
+    places = (flat - low) * scale
     places[:, 1] = size[1] - places[:, 1]
-    mask = np.zeros(np.ceil(size).astype(int)[::-1], dtype=np.bool_)
+    mask = np.zeros(np.ceil(size - 1e-6).astype(int)[::-1], dtype=np.bool_)
     fill_triangles(places, np.ascontiguousarray(triangles, dtype=np.int32), mask)
+    if not mask.any():
+        raise ModelError("the mesh is so thin from this side that nothing of it is seen")
     return np.pad(mask, 2)
 
 

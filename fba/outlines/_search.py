@@ -28,7 +28,9 @@ def nearest(
     total = len(descriptions)
     bounds = np.zeros(total)
     if prune:
-        bounds = lower_bounds(project(query), project(descriptions) if projected is None else projected, ground)
+        bounds = lower_bounds(
+            project(query), project(descriptions) if projected is None else projected, ground
+        )
     found: list[tuple[float, int]] = []
     compared = 0
     for number in np.argsort(bounds, kind="stable").tolist():
