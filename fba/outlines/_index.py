@@ -50,9 +50,7 @@ class Choice:
 
     def __post_init__(self) -> None:
         if self.views < 1 or self.every < 1 or not self.pitches:
-            raise ValueError(
-                "Choice: at least one view, a step of at least one frame, and a pitch are needed"
-            )
+            raise ValueError("Choice: views and every must be at least 1, and a pitch is needed")
 
     @property
     def all_views(self) -> tuple[View, ...]:
@@ -197,8 +195,7 @@ def build_index(
     """
     face = model or FaceModel.default()
     listed = [(name, animation, range(0, len(animation), choice.every)) for name, animation in performances]
-    views = choice.all_views
-    total = sum(len(frames) for _, _, frames in listed) * len(views)
+    total = sum(len(frames) for _, _, frames in listed) * choice.views * len(choice.pitches)
     if not total:
         raise FbaError("an index needs at least one frame, and there is none")
     if total > MOST_SILHOUETTES:
@@ -207,6 +204,7 @@ def build_index(
             "draw fewer views, or frames at a larger step",
             limit="silhouettes", found=total, allowed=MOST_SILHOUETTES,
         )  # fmt: skip
+    views = choice.all_views
     figures: dict[bool, Figure] = {}
     masks, descriptions = list[UInt8](), list[Float64]()
     tables = list[tuple[Int32, Int32, Int64, Int64, Int32]]()

@@ -32,7 +32,7 @@ def read_mask(path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LIMITS) 
 
     A picture with transparent parts: the figure is what is opaque. Others: what differs from a plain
     background, whose colour is that of the border. Raises FormatError for a file that is no picture, or has
-    no figure, a figure without a background, or several; LimitError beyond `limits.pixels`.
+    no figure, no plain background, or several figures; LimitError beyond `limits.pixels`.
     """
     pixels = _read_pixels(path, limits)
     with naming_file(path):
@@ -109,7 +109,7 @@ def _single_figure(mask: Bool) -> Bool:
 
     labels, count = ndimage.label(mask, np.ones((3, 3)))
     if not count:
-        raise FormatError("shows no figure: it is all background")
+        raise FormatError("shows no figure before a background: it is all of one colour, or transparent")
     areas = np.bincount(labels.ravel(), minlength=count + 1)
     areas[0] = 0
     largest = int(areas.argmax())
@@ -117,7 +117,5 @@ def _single_figure(mask: Bool) -> Bool:
     if figures > 1:
         raise FormatError(f"shows {figures} figures that do not touch; cut out the one that is meant")
     result: Bool = labels == largest
-    if result.all():
-        raise FormatError("shows no background: the figure fills the picture")
     fit_mask(result)  # its size
     return result
