@@ -21,7 +21,8 @@ def sample(masses: Float64, count: int) -> Int64:
     """Return nodes (count,), each as often as its share of the mass says, ascending."""
     reached = np.cumsum(masses)
     places = (np.arange(count) + 0.5) * (reached[-1] / count)
-    return np.minimum(np.searchsorted(reached, places), len(masses) - 1).astype(np.int64)
+    nodes = np.minimum(np.searchsorted(reached, places), len(masses) - 1)
+    return np.asarray(nodes, dtype=np.int64)
 
 
 def earth_movers_distance(first: Floating, second: Floating, ground: Ground = "cityblock") -> float:

@@ -23,7 +23,7 @@ from fba.outlines._mask import fit_mask
 from fba.outlines._methods import describe_points
 from fba.outlines._raster import View, draw_silhouette
 from fba.outlines._search import follow, nearest
-from fba.parameters import bap_angles
+from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, bap_angles
 from fba.tracks import BodyTrack, FaceTrack
 
 MOST_SILHOUETTES = 200_000
@@ -240,10 +240,11 @@ def build_index(
 
 def _stream(name: str, animation: Animation) -> Stream:
     face, body = animation.face, animation.body
-    shown = np.zeros(68, dtype=bool)
-    shown[2:] = face is not None
-    sent = np.zeros(296, dtype=bool) if body is None else body.mask.any(axis=0)
-    return Stream(name, animation.rate, tuple(shown.tolist()), tuple(sent.tolist()))
+    shown = tuple(face is not None and fap >= FIRST_LOW_LEVEL_FAP for fap in range(1, FAP_COUNT + 1))
+    sent = np.zeros(BAP_COUNT, dtype=bool)
+    if body is not None:
+        sent |= body.mask.any(axis=0)
+    return Stream(name, animation.rate, shown, tuple(map(bool, sent)))
 
 
 def _describe(mask: Bool) -> Float64:

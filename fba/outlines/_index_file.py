@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fba.arrays import Array, Bool, Float32, Int32, Int64, UInt8
+from fba.arrays import Bool, Float32, Int32, Int64, UInt8
 from fba.atomic import atomic
 from fba.errors import FormatError
 from fba.outlines._mask import SIDE
@@ -102,7 +102,7 @@ def write_index(path: str | os.PathLike[str], stored: Stored) -> None:
             for stream in stored.streams
         ],
     }
-    arrays: dict[str, Array] = {name: getattr(stored, name) for name in LAYOUT}
+    arrays: dict[str, Any] = {name: getattr(stored, name) for name in LAYOUT}
     with atomic(path) as file:
         np.savez_compressed(file, about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8), **arrays)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Bool, Float64, Floating, Integer
+from fba.arrays import Bool, Float64, Floating, Int32, Integer
 from fba.compiled import compiled
 from fba.errors import ModelError
 from fba.outlines._mask import SIDE
@@ -78,7 +78,7 @@ def draw_silhouette(vertices: Floating, triangles: Integer, view: View = View(),
 
 
 @compiled
-def fill_triangles(places, triangles, mask):  # type: ignore[no-untyped-def]
+def fill_triangles(places: Float64, triangles: Int32, mask: Bool) -> None:
     """Set all pixels of a mask (H, W) whose centre lies in a triangle. places: (V, 2), x and y in pixels."""
     height, width = mask.shape
     for number in range(triangles.shape[0]):

@@ -60,6 +60,6 @@ def find_nodes(mask: Bool, cell: float = CELL) -> Nodes:
     cells = np.floor(points / cell).astype(np.int64)
     _, node = np.unique(cells, axis=0, return_inverse=True)
     node = node.reshape(-1)
-    masses = np.bincount(node, radii)
+    masses: Float64 = np.bincount(node, radii).astype(np.float64)
     means = [np.bincount(node, values * radii) / masses for values in (*points.T, radii)]
     return Nodes(np.column_stack(means[:2]), means[2], masses, int(mask.sum()))

@@ -90,8 +90,8 @@ def split_into_paths(tree: Tree, weights: Float64) -> Int64:
             paths[node] = len(starts)
             starts.append(node)
             levels.append(0 if parent == root else levels[paths[parent]] + 1)
-    numbers = np.argsort(np.lexsort((-below[starts], levels))) if starts else np.empty(0, dtype=np.int64)
-    return np.append(numbers, -1)[paths].astype(np.int64)
+    order = np.lexsort((-below[starts], np.array(levels))) if starts else np.empty(0, dtype=np.int64)
+    return np.asarray(np.append(np.argsort(order), -1)[paths], dtype=np.int64)
 
 
 def embed_l1(tree: Tree, paths: Int64) -> Float64:
