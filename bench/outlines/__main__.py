@@ -25,11 +25,14 @@ def kimia(folder: Path) -> None:
 
 
 @main.command()
-def objects() -> None:
+@click.option("--method", "names", multiple=True, help="points, tree-l1, tree-l2, histogram; default: all.")
+@click.option("--around", is_flag=True, help="All sides at one height, in steps of 2 degrees.")
+def objects(names: tuple[str, ...], around: bool) -> None:
     """Nine objects from 180 sides: the object and the side of the nearest other silhouette."""
     from bench.outlines import retrieval
 
-    click.echo("\n".join(retrieval.objects(_say)))
+    for line in retrieval.objects(_say, names, around=around):
+        click.echo(line)
 
 
 @main.command()

@@ -16,33 +16,37 @@ from fba.parameters import BAP_COUNT, FAP_COUNT
 
 Mesh = tuple[Float64, Int32]
 Place = tuple[float, float, float]
-YAWS, PITCHES = range(0, 360, 10), range(0, 50, 10)
+ABOVE = [(yaw, pitch) for yaw in range(0, 360, 10) for pitch in range(0, 50, 10)]
+"""180 sides around and above, in steps of 10 degrees."""
+AROUND = [(yaw, 20) for yaw in range(0, 360, 2)]
+"""180 sides around, in steps of 2 degrees, from 20 degrees above."""
 ROUND = 24
 """Vertices around a tube."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A silhouette: of which object, and from where."""
+    """A silhouette: of which object, from where, and the step to the next side, degrees."""
 
     name: str
     yaw: int
     pitch: int
+    step: int
     mask: Bool
 
     def is_beside(self, other: Seen) -> bool:
         """Whether the other is of the same object, from a neighbouring side."""
         turned = abs((self.yaw - other.yaw + 180) % 360 - 180)
-        return self.name == other.name and turned <= 10 and abs(self.pitch - other.pitch) <= 10
+        return self.name == other.name and turned <= self.step and abs(self.pitch - other.pitch) <= self.step
 
 
-def silhouettes() -> Iterator[Seen]:
-    """Yield all silhouettes, object by object."""
+def silhouettes(*, around: bool) -> Iterator[Seen]:
+    """Yield all silhouettes, object by object. around: from `AROUND`, not from `ABOVE`."""
+    step = 2 if around else 10
     for name, make in OBJECTS.items():
         vertices, triangles = make()
-        for yaw in YAWS:
-            for pitch in PITCHES:
-                yield Seen(name, yaw, pitch, draw_silhouette(vertices, triangles, View(yaw, pitch)))
+        for yaw, pitch in AROUND if around else ABOVE:
+            yield Seen(name, yaw, pitch, step, draw_silhouette(vertices, triangles, View(yaw, pitch)))
 
 
 def grid(rows: list[Float64]) -> Mesh:

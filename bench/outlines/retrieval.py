@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,13 +62,14 @@ def leave_one_out(name: str, described: Float32, method: Method, say: Callable[[
     return Row(name, np.array(neighbours), compared / len(described), seconds)
 
 
-def all_methods(masks: Sequence[Bool], say: Callable[[str], None]) -> list[Row]:
-    """Return a row for each method of the library."""
-    rows = []
-    for name, method in methods().items():
+def all_methods(
+    masks: Sequence[Bool], say: Callable[[str], None], names: Sequence[str] = ()
+) -> Iterator[Row]:
+    """Yield a row for each method of the library, or for those that are named."""
+    for name in names or methods():
+        method = methods()[name]
         described = stacked([method.describe(mask) for mask in masks])
-        rows.append(leave_one_out(name, described, method, say))
-    return rows
+        yield leave_one_out(name, described, method, say)
 
 
 def unequal(masks: Sequence[Bool]) -> Row:
@@ -120,19 +121,13 @@ def kimia(folder: Path, say: Callable[[str], None]) -> list[str]:
     return lines
 
 
-def objects(say: Callable[[str], None]) -> list[str]:
-    """Return the lines of the table for nine objects from 180 sides."""
-    seen = list(silhouettes())
-    rows = all_methods([each.mask for each in seen], say)
-    lines = [
-        "| method | correct object | correct pose | distances a query | ms a query |",
-        "|---|---|---|---|---|",
-    ]
-    for row in rows:
+def objects(say: Callable[[str], None], names: Sequence[str], *, around: bool) -> Iterator[str]:
+    """Yield the lines of the table for nine objects from 180 sides. names: of methods; none for all."""
+    seen = list(silhouettes(around=around))
+    yield "| method | correct object | correct pose | distances a query | ms a query |"
+    yield "|---|---|---|---|---|"
+    for row in all_methods([each.mask for each in seen], say, names):
         pairs = [(each, seen[other]) for each, other in zip(seen, row.neighbours, strict=True)]
         named = np.mean([each.name == other.name for each, other in pairs])
         posed = np.mean([each.is_beside(other) for each, other in pairs])
-        lines.append(
-            f"| {row.name} | {named:.1%} | {posed:.1%} | {row.compared:.0f} | {1000 * row.seconds:.0f} |"
-        )
-    return lines
+        yield f"| {row.name} | {named:.1%} | {posed:.1%} | {row.compared:.0f} | {1000 * row.seconds:.0f} |"

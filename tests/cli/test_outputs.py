@@ -111,7 +111,7 @@ OVERWRITING = [
     "markers both.fba IN.glb -o OUT",
     "capture livelink --play --model IN.glb -o OUT",
     "find IN.png both.fba -o OUT",
-    "find face.fap IN.npz -o OUT",
+    "find face.fap IN.png -o OUT",
     "find --build OUT IN.npz",
     "send IN.fap rtp://127.0.0.1:50299 --sdp OUT",
 ]
