@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 
 from fba.arrays import Bool, UInt8
-from fba.errors import FormatError
+from fba.errors import FormatError, warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import naming_file, open_source
 
@@ -33,6 +33,7 @@ def read_mask(path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LIMITS) 
     A picture with transparent parts: the figure is what is opaque. Others: what differs from a plain
     background, whose colour is that of the border. Raises FormatError for a file that is no picture, or has
     no figure, no plain background, or several figures; LimitError beyond `limits.pixels`.
+    Warns of a figure at the edge of the picture, which may be cut off.
     """
     pixels = _read_pixels(path, limits)
     with naming_file(path):
@@ -118,4 +119,6 @@ def _single_figure(mask: Bool) -> Bool:
         raise FormatError(f"shows {figures} figures that do not touch; cut out the one that is meant")
     result: Bool = labels == largest
     fit_mask(result)  # its size
+    if result[[0, -1]].any() or result[:, [0, -1]].any():
+        warn("the figure reaches the edge of the picture; a part of a figure is compared with whole ones", 4)
     return result

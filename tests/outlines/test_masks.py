@@ -10,7 +10,7 @@ import pytest
 from PIL import Image, ImageDraw
 
 from fba import Limits
-from fba.errors import FormatError, LimitError
+from fba.errors import FbaWarning, FormatError, LimitError
 from fba.outlines import find_nodes, fit_mask, read_mask
 from fba.outlines._skeleton import medial_axis
 
@@ -86,6 +86,11 @@ def test_pictures_without_a_figure(
     with pytest.raises(FormatError, match=text) as caught:
         read_mask(drawn(*boxes, **settings))
     assert "picture.png" in str(caught.value)
+
+
+def test_a_figure_at_the_edge_may_be_cut_off(drawn: Draw) -> None:
+    with pytest.warns(FbaWarning, match="reaches the edge of the picture"):
+        assert read_mask(drawn((30, 50, 60, 90))).any()
 
 
 def test_a_background_that_is_not_plain(tmp_path: Path) -> None:
