@@ -37,7 +37,14 @@ def read_mask(path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LIMITS) 
     """
     pixels = _read_pixels(path, limits)
     with naming_file(path):
-        return _single_figure(_foreground(pixels))
+        mask = _single_figure(_foreground(pixels))
+    if mask[[0, -1]].any() or mask[:, [0, -1]].any():
+        warn(
+            f"{os.fspath(path)}: the figure reaches the edge of the picture; what is cut off is missed in its "
+            "outline",
+            stacklevel=2,
+        )
+    return mask
 
 
 def fit_mask(mask: Bool) -> Bool:
@@ -119,6 +126,4 @@ def _single_figure(mask: Bool) -> Bool:
         raise FormatError(f"shows {figures} figures that do not touch; cut out the one that is meant")
     result: Bool = labels == largest
     fit_mask(result)  # its size
-    if result[[0, -1]].any() or result[:, [0, -1]].any():
-        warn("the figure reaches the edge of the picture; a part of a figure is compared with whole ones", 4)
     return result
