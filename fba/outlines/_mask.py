@@ -40,8 +40,8 @@ def read_mask(path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LIMITS) 
         mask = _single_figure(_foreground(pixels))
     if mask[[0, -1]].any() or mask[:, [0, -1]].any():
         warn(
-            f"{os.fspath(path)}: the figure reaches the edge of the picture; what is cut off is missed in its "
-            "outline",
+            f"{os.fspath(path)}: the figure reaches the edge of the picture; what is cut off is missed in "
+            "its outline",
             stacklevel=2,
         )
     return mask
