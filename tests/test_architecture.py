@@ -75,6 +75,7 @@ fba.capture.points
 fba.capture
 fba.capture.live
 fba.emotion
+fba.outlines
 fba.formats
 fba.formats.text
 fba.formats.epf
@@ -116,6 +117,7 @@ fba.cli.coding
 fba.cli.subcommands
 fba.cli.commands
 fba.cli.commands.live
+fba.cli.commands.archives
 fba.__main__
 """
 FLOORS = _FLOORS.split()

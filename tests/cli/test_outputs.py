@@ -72,7 +72,7 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
     assert writing == {
         "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
         "conformance", "capture", "markers", "express", "model learn-fit", "emote", "emotion",
-        "persona learn", "persona play", "export", "send",
+        "persona learn", "persona play", "export", "send", "find",
     }  # fmt: skip
 
 
@@ -110,6 +110,9 @@ OVERWRITING = [
     "markers IN.png -o OUT",
     "markers both.fba IN.glb -o OUT",
     "capture livelink --play --model IN.glb -o OUT",
+    "find IN.png both.fba -o OUT",
+    "find face.fap IN.png -o OUT",
+    "find --build OUT IN.npz",
     "send IN.fap rtp://127.0.0.1:50299 --sdp OUT",
 ]
 
