@@ -39,6 +39,9 @@ TURNING_FAPS = (3, 19, 20, 21, 22, 47)
 """FAPs that rotate what they move: jaw, lids and the rolled tongue. A triangle may face another way then."""
 IMPORTANCE = 300.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
+LID_FAPS = (19, 20, 21, 22)
+LID_SHARE = 4.0
+"""Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
 SMOOTHING = 0.3
@@ -221,7 +224,8 @@ def _importance(model: FaceModel) -> Float64:
                 continue
             moved = np.linalg.norm(mesh.displacements.astype(np.float64), axis=2).max(axis=1)
             rows = mesh.vertices + model.starts[mesh.part]
-            share[rows] = np.maximum(share[rows], moved / max(float(moved.max()), 1e-30))
+            most = max(float(moved.max()), 1e-30) / (LID_SHARE if table.fap in LID_FAPS else 1.0)
+            share[rows] = np.maximum(share[rows], moved / most)
     for part in model.of_kind("eye"):
         start = model.starts[part.name]
         share[start : start + len(part.vertices)] = EYE_SHARE

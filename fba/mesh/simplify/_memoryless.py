@@ -78,7 +78,7 @@ class Simplification:
         corners = root[self._full]
         a, b, c = corners.T
         left = wedge[self._full[(a != b) & (b != c) & (c != a)]]
-        used, triangles = np.unique(left, return_inverse=True)
+        used, corner = np.unique(left, return_inverse=True)
         home = np.zeros(len(self._wedge_forest[0]), dtype=np.int32)  # the vertex that each wedge is at
         home[wedge] = root
         points: Int32 = home[used]
@@ -89,7 +89,7 @@ class Simplification:
         beside[points] = number[used]
         parents = np.where(number[wedge] >= 0, number[wedge], beside[root]).astype(np.int32)
         positions = place[points]
-        triangles = np.ascontiguousarray(triangles.reshape(-1, 3), dtype=np.int32)
+        triangles = np.ascontiguousarray(corner.reshape(-1, 3), dtype=np.int32)
         rows, weights = self._sources(positions, parents)
         return Level(positions, triangles, parents, points, rows, weights)
 
