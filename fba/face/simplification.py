@@ -56,6 +56,8 @@ LEAST_MOTION = 1e-3
 """Motions below this share of the largest of a FAP are left out of its table."""
 LEVEL_RATIO = 0.32
 """Triangles of a level of detail by those of the next finer one: the source's 680 of 2141."""
+LEAST_PER_PART = 50
+"""Triangles of a level of detail by its parts, below which parts lose their shape."""
 PERCENT = 99
 """Percentage of the vertices to which an error refers."""
 
@@ -173,9 +175,13 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
 
 
 def level_sizes(model: FaceModel, count: int) -> list[int]:
-    """Return the triangles of this number of levels, each with `LEVEL_RATIO` of those of the one before."""
-    total = len(model.triangles)
-    return [max(round(total * LEVEL_RATIO**number), len(model.parts)) for number in range(1, count + 1)]
+    """Return the triangles of up to `count` levels, each with `LEVEL_RATIO` of those of the one before.
+
+    After the first, levels with fewer than `LEAST_PER_PART` triangles a part are left out.
+    """
+    total, least = len(model.triangles), LEAST_PER_PART * len(model.parts)
+    first, *others = (round(total * LEVEL_RATIO**number) for number in range(1, count + 1))
+    return [max(first, len(model.parts)), *(faces for faces in others if faces >= least)]
 
 
 def _values(pose: dict[int, int]) -> Float32:

@@ -64,7 +64,7 @@ def test_feature_points_move_as_on_the_full_face(made: FaceSimplification, tenth
 
 def test_the_moved_face_stays_near(made: FaceSimplification) -> None:
     third, tenth = (made.error(made.mesh.level(len(made.model.triangles) // by)) for by in (3, 10))
-    assert third < 0.0016
+    assert third < 0.0018
     assert tenth < 0.004
 
 
@@ -118,6 +118,7 @@ def test_level_sizes_fall() -> None:
     head = FaceModel.default()
     sizes = level_sizes(head, 4)
     assert sizes == sorted(sizes, reverse=True)
+    assert len(sizes) == 3  # a fourth would have 382 triangles for 9 parts
     assert sizes[0] / len(head.triangles) == pytest.approx(0.32, abs=0.01)
 
 
