@@ -31,6 +31,7 @@ fba.geometry
 fba.parameters
 fba
 fba.mesh
+fba.mesh.simplify
 fba.gltf
 fba.codec.settings
 fba.codec._plane
@@ -41,6 +42,7 @@ fba.carriage
 fba.face.interpolation
 fba.face
 fba.face.deform
+fba.face.simplification
 fba.face.learning
 fba.face.gltf
 fba.face.builtin

@@ -41,7 +41,7 @@ _COMMANDS = {
     "emote": "Play a performance in a mood: angry, surprised, sad, sleepy, happy and others.",
     "emotion": "Read the expressions of a face from any file with FAPs.",
     "markers": "Let captured markers move any head: map them onto it, play, export.",
-    "model": "Inspect face models, check them, import them, fit them to a person.",
+    "model": "Inspect face models, check them, import, fit and simplify them.",
     "persona": "Learn how an actor moves the face, and play another person's performance so.",
     "demo": "Encode the sample animation, print its size, and play it.",
 }
