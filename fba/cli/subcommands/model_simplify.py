@@ -39,7 +39,8 @@ class _Goal:
         type=click.IntRange(1, MAX_LEVELS),
         metavar="N",
         help="Keep all triangles, and store up to N coarser levels beside them, each with 0.32 of the "
-        "triangles of the one before. Players draw the level that suits the size on the screen.",
+        "triangles of the one before, for programs that read FBA_face. `fba play` makes coarser meshes of its "
+        "own.",
     )
 
     def check(self) -> None:
