@@ -19,6 +19,8 @@ FADE_SECONDS = 0.4
 """Seconds in which a notice fades."""
 MAX_BUTTONS_SHARE = 0.55
 """Share of the window's width; wider buttons become one with a menu, so that they do not cover the figure."""
+SLOW = 0.9
+"""Speed below which a recording says that the window is slower than its film."""
 MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
@@ -30,6 +32,8 @@ def draw_recording(session: Session) -> float:
     to = imgui.get_background_draw_list()
     x, y = EDGE + 4, EDGE + 7
     text = f"REC {clock_text(session.recording)[:-2]}"
+    if session.recording_speed < SLOW:
+        text += f"   shown at {session.recording_speed:.0%} of the speed, all frames are in the film"
     to.add_circle_filled((x + 6, y + 9), 6.0, theme.packed(theme.ALERT))
     _draw_shadowed(to, (x + 20, y), theme.packed(theme.TEXT), text)
     return 40.0 + float(imgui.calc_text_size(text).x)

@@ -83,7 +83,8 @@ class Session:
     will be shown in place: FAPs, float32 (68,), and BAPs, float64 (296,), zeros without a body.
 
     requests: what the window shall do after this picture, see `request`. recording: seconds of the film so
-    far, None if none is being recorded. values: FAPs and BAPs of the last picture, after the hooks. sound:
+    far, None if none is being recorded. recording_speed: seconds of it per second, below 1 on a machine that
+    draws more slowly than the film is shown. values: FAPs and BAPs of the last picture, after the hooks. sound:
     path of the sound file; audio: its player, None without a sound device; the sound begins sound_offset
     seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures without input.
     unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next, see `drop`.
@@ -106,7 +107,8 @@ class Session:
         self.source = source or Source(scene)
         self.size = size
         self.scale = scale
-        self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=clock)
+        self.clock = clock
+        self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=lambda: self.clock())
         self.selection = Selection()
         self.open: set[str] = set()
         self.bare = False
@@ -114,6 +116,7 @@ class Session:
         self.before_frame: list[Hook] = []
         self.requests: deque[str] = deque()
         self.recording: float | None = None
+        self.recording_speed = 1.0
         self.rolling: set[str] = set()
         self.unsaved: set[str] = set()
         self.dropped: tuple[Path, ...] = ()
@@ -123,7 +126,6 @@ class Session:
         self.sound: PathLike | None = None
         self.sound_offset = 0.0
         self.values: tuple[Float32, Float64] = (np.zeros(68, np.float32), np.zeros(296))
-        self.clock = clock
         self.last_input = clock()
         self._notices: list[Notice] = []
         self._leave_again_until = -math.inf
@@ -205,11 +207,10 @@ class Session:
 
     @property
     def restless(self) -> bool:
-        """Whether the picture changes without input of the user."""
+        """Whether the picture changes without input of the user, for another reason than that it plays."""
         fades_from = self.clock() + NOTICE_FADE_SECONDS
         return (
-            self.transport.playing
-            or self.viewpoint.gliding
+            self.viewpoint.gliding
             or bool(self.rolling)
             or self.recording is not None
             or any(notice.until < fades_from for notice in self._notices)
