@@ -21,6 +21,8 @@ MAX_BUTTONS_SHARE = 0.55
 """Share of the window's width; wider buttons become one with a menu, so that they do not cover the figure."""
 SLOW = 0.9
 """Speed below which a recording says that the window is slower than its film."""
+MAX_NAME_SHARE = 0.25
+"""Share of the window's width that the name and the facts may take together: a figure is in the middle."""
 MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
@@ -52,7 +54,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
     scene = session.scene
     animation: object = scene.animation if isinstance(scene, Scene) else None
     facts = (animation.message if isinstance(animation, LiveAnimation) else "") or _facts(session)
-    if imgui.calc_text_size(name + facts).x + x > room:
+    if imgui.calc_text_size(name + facts).x + x > min(room, MAX_NAME_SHARE * display[0]):
         facts = ""
     while name and imgui.calc_text_size(name).x + x > room:
         name = name[: max(len(name) - 8, 0)]

@@ -158,9 +158,13 @@ class Session:
         self.requests.append(what)
 
     def escape(self) -> None:
-        """Close an open list, else leave full screen, else close the window."""
+        """Close what is in the way, one thing a time: a list, the help, a film, full screen, the window."""
         if self.popup:
             self.popup = False
+        elif "help" in self.open and not self.bare:
+            self.open.discard("help")
+        elif self.recording is not None:
+            self.request("record")
         elif self.full_screen:
             self.request("fullscreen")
         else:
