@@ -14,7 +14,7 @@ from fba_player.scene._compare_timeline import CompareTimeline
 from fba_player.scene._differences import Differences, differences
 from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
 from fba_player.scene.scene import Scene
-from fba_player.view._camera import PRESETS, Camera, Subject
+from fba_player.view._camera import FACE_PRESETS, PRESETS, Camera, Subject
 from fba_player.view._view import Extras, View
 from fba_player.view.protocols import Timed
 
@@ -95,6 +95,16 @@ class CompareScene(Timed[CompareTimeline]):
         """The scenes' names."""
         return " | ".join(name for name in self.names if name)
 
+    @property
+    def follow(self) -> str | None:
+        """What the camera follows; of all scenes."""
+        return self.scenes[0].follow
+
+    @follow.setter
+    def follow(self, what: str | None) -> None:
+        for scene in self.scenes:
+            scene.follow = what
+
     def show(self, name: str, on: object = True) -> None:
         """Set a switch of all scenes; ValueError for an unknown name or value."""
         for scene in self.scenes:
@@ -128,7 +138,8 @@ class CompareScene(Timed[CompareTimeline]):
         self._yaw = camera.yaw
         upper = [scene.gesture_subject or scene.face_subject for scene in self.scenes if scene.has_body]
         still = all(scene.gesture_subject for scene in self.scenes if scene.has_body)
-        if not self.has_body or preset == "body" or (preset is None and not still):
+        whole = preset is not None and preset not in FACE_PRESETS
+        if not self.has_body or whole or (preset is None and not still):
             subjects = [scene.subject for scene in self.scenes]
             self._apart = None
         elif preset is None:

@@ -83,12 +83,12 @@ class Session:
     will be shown in place: FAPs, float32 (68,), and BAPs, float64 (296,), zeros without a body.
 
     requests: what the window shall do after this picture, see `request`. recording: seconds of the film so
-    far, None if none is being recorded. recording_speed: seconds of it per second, below 1 on a machine that
-    draws more slowly than the film is shown. values: FAPs and BAPs of the last picture, after the hooks. sound:
-    path of the sound file; audio: its player, None without a sound device; the sound begins sound_offset
-    seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures without input.
-    unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next, see `drop`.
-    popup: whether a list is open over the picture; set to False to close it.
+    far, None if none is being recorded. recording_speed: seconds of it per second, below 1 on a machine
+    that draws more slowly than the film is shown. values: FAPs and BAPs of the last picture, after the
+    hooks. sound: path of the sound file; audio: its player, None without a sound device; the sound begins
+    sound_offset seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures
+    without input. unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next,
+    see `drop`. popup: whether a list is open over the picture; set to False to close it.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class Session:
         self.size = size
         self.scale = scale
         self.clock = clock
-        self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=lambda: self.clock())
+        self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=self._now)
         self.selection = Selection()
         self.open: set[str] = set()
         self.bare = False
@@ -154,7 +154,7 @@ class Session:
         return list(self._notices)
 
     def request(self, what: str) -> None:
-        """Request "screenshot", "transparent", "record" or "fullscreen" from the window."""
+        """Request "screenshot", "transparent", "record", "fullscreen" or "copy_command" from the window."""
         self.requests.append(what)
 
     def escape(self) -> None:
@@ -195,6 +195,10 @@ class Session:
         self.leave()
         if self.closing:
             self.dropped = paths
+
+    def _now(self) -> float:
+        """Return the reading of the clock, which is another while a film is recorded."""
+        return self.clock()
 
     def touched(self) -> None:
         """Note that the user moved the mouse or pressed something, so that hidden controls come back."""

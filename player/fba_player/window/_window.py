@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 import time as wall
 import warnings
 from collections.abc import Callable
@@ -48,7 +50,7 @@ HIDDEN_SECONDS = 0.25
 USUAL_RATE = 60
 """Pictures a second of a display that does not say how many it shows."""
 LEAST_SHARE = 0.9
-"""Least time from one picture to the next, in periods of the display: where it sets the pace, it still can."""
+"""Least time from one picture to the next, in periods of the display, which may set the pace itself."""
 WARNING_SECONDS = 12.0
 """Seconds for which warnings about the file are shown."""
 SETTLING_PICTURES = 4
@@ -175,8 +177,8 @@ class Window(Closing):
     def _seconds_to_next(self) -> float:
         """Return the seconds from one picture to the next while nothing but the performance moves.
 
-        Frame by frame, there is one for each frame; in a window that the user has turned away from, as many as
-        a film would have; else as many as the display shows.
+        Frame by frame, there is one for each frame; in a window without the focus, as many as a film would
+        have; else as many as the display shows.
         """
         transport = self.transport
         if not transport.interpolate:
@@ -335,6 +337,8 @@ class Window(Closing):
                 self.captures.toggle_recording()
             elif request == "fullscreen":
                 self._full_screen.toggle()
+            elif request == "copy_command":
+                self._copy_command()
             self._redraw()
 
     def _screenshot(self, *, transparent: bool) -> None:
@@ -345,6 +349,15 @@ class Window(Closing):
             self.session.say(f"No picture could be drawn: {error}", "error", 8.0)
             return
         self.captures.screenshot(pixels, transparent=transparent)
+
+    def _copy_command(self) -> None:
+        """Put the command that draws this picture onto the clipboard, and show it."""
+        session, time = self.session, self.transport.time
+        name = os.path.abspath(session.source.path) if session.source.path is not None else "FILE"
+        view = session.viewpoint.command(time)
+        text = f"fba render {shlex.quote(name)} -o picture.png --time {time:.3f} {view}"
+        self._glfw.set_clipboard_string(self._window, text)
+        session.say(f"Copied: {text}", seconds=8.0, about="command")
 
     def _show_title(self) -> None:
         if page_of(self.session) is not None:

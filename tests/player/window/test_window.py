@@ -168,7 +168,9 @@ def hide(window: Window, monkeypatch: pytest.MonkeyPatch, attribute: int) -> Non
     """Let glfw say of the window what a window manager would: there is none on the virtual display."""
     ask = glfw.get_window_attrib
     monkeypatch.setattr(
-        glfw, "get_window_attrib", lambda w, name: name == attribute or (name != glfw.ICONIFIED and ask(w, name))
+        glfw,
+        "get_window_attrib",
+        lambda w, what: what == attribute or (what != glfw.ICONIFIED and ask(w, what)),
     )
 
 
