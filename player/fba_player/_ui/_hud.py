@@ -27,8 +27,22 @@ MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
 
-def draw_recording(session: Session) -> float:
-    """Draw "REC" and the time in the upper left corner during a recording; return its width in points."""
+def draw_work(session: Session) -> float:
+    """Draw how far a recording and an export are in the upper left corner; return their width in points."""
+    taken = _draw_recording(session)
+    export = session.exports.now
+    if export is None:
+        return taken
+    x, y = EDGE + 4 + taken, EDGE + 7
+    to = imgui.get_background_draw_list()
+    text = f"Export {export.share:.0%}" if export.total else "Export begins"
+    to.add_rect_filled((x, y + 3), (x + 60, y + 15), theme.packed(theme.LINE), rounding=3.0)
+    to.add_rect_filled((x, y + 3), (x + 60 * export.share, y + 15), theme.packed(theme.ACCENT), rounding=3.0)
+    _draw_shadowed(to, (x + 70, y), theme.packed(theme.TEXT), text)
+    return taken + 90.0 + float(imgui.calc_text_size(text).x)
+
+
+def _draw_recording(session: Session) -> float:
     if session.recording is None:
         return 0.0
     to = imgui.get_background_draw_list()

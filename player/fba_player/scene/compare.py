@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,6 +38,14 @@ CAPTION_HEIGHT = 0.96
 """Height of a caption above the middle of a head, in half heads."""
 
 
+def _rebuild(
+    scenes: Sequence[Scene], arrangement: str, names: Sequence[str], orbit: float | None
+) -> CompareScene:
+    scene = CompareScene(scenes, arrangement=arrangement, names=names)
+    scene.orbit = orbit
+    return scene
+
+
 class CompareScene(Timed[CompareTimeline]):
     """Several scenes shown together on one timeline; a `Showable` like `Scene`.
 
@@ -63,6 +71,10 @@ class CompareScene(Timed[CompareTimeline]):
         self._drawings = [Drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
         self._apart: float | None = None
         self._differences: dict[tuple[int, int], Differences] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy in another process builds its figures anew."""
+        return _rebuild, (self.scenes, self.arrangement, self.names, self.orbit)
 
     @property
     def arrangement(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -69,6 +69,7 @@ class Scene(Timed[Timeline]):
         self.timeline = timeline or Timeline(animation, self.model)
         self.switches = Switches()
         self.view = view
+        self.axes = axes
         self._extent: tuple[str | None, Extent] | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
@@ -79,6 +80,13 @@ class Scene(Timed[Timeline]):
             self._skeleton = self._body.skeleton
             self._poser = GroundedPoser(self._skeleton, axes)
             self._bones = Bones.from_skeleton(self._skeleton)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy in another process builds its figures anew."""
+        body = replace(self._body) if self.has_body else None  # without what was made for drawing
+        state = {"follow": self.follow, "orbit": self.orbit}
+        switches = self.switches.changed
+        return _rebuild, (self.animation, self.model, body, self.axes, self.view, switches, state)
 
     @property
     def view(self) -> str:
@@ -250,6 +258,22 @@ class Scene(Timed[Timeline]):
             extent = body_extent(positions, self._skeleton.names, self.person.headroom, follow=self.follow)
             self._extent = (self.follow, extent)
         return self._extent[1]
+
+
+def _rebuild(
+    animation: Animation,
+    model: FaceModel,
+    body: BodyModel | None,
+    axes: Axes,
+    view: str,
+    switches: dict[str, object],
+    state: dict[str, Any],
+) -> Scene:
+    scene = Scene(animation, model, body=body, axes=axes, view=view)
+    for name, value in switches.items():
+        scene.show(name, value)
+    vars(scene).update(state)
+    return scene
 
 
 def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:

@@ -154,14 +154,22 @@ class Viewpoint:
         self._from, self._to = self._from.orbit(turned, 0.0), self._to.orbit(turned, 0.0)
         self.scene.orbit = ORBIT_SECONDS if self.scene.orbit is None else None
 
-    def command(self, time: float) -> str:
-        """Return the options of `fba play` and `fba render` that give this view at a time."""
+    @property
+    def following(self) -> str | None:
+        """What a camera without the name of its view has to follow to do as this one does."""
+        return "head" if self.follow is None and self._of_head else self.follow
+
+    def command(self) -> str:
+        """Return the options of `fba play` and `fba render` that give this view."""
         turned = self.camera.orbit(self._turned(), 0.0)
-        follow = self.follow
-        if follow is None and self._of_head:
-            follow = "head"
-        parts = [f"--camera {turned.text}", f"--follow {follow}" if follow else ""]
+        parts = [f"--camera {turned.text}", f"--follow {self.following}" if self.following else ""]
         return " ".join(filter(None, [*parts, f"--orbit {self.scene.orbit:g}" if self.scene.orbit else ""]))
+
+    def camera_for_export(self, aspect: float) -> Camera:
+        """Return the camera for pictures of another shape: a view that was not moved is fitted."""
+        if self._preset != "" and self._to == self._fitted_to[1]:
+            return self.scene.camera(self._preset, aspect)
+        return self.camera.orbit(self._turned(), 0.0)
 
     def _turned(self) -> float:
         """Return the degrees that it has turned by itself."""

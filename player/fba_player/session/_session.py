@@ -21,6 +21,7 @@ from fba.atomic import PathLike
 from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._camera_controller import Viewpoint
+from fba_player.session._exports import Exports
 from fba_player.session._keys import by_name
 from fba_player.session._source import Source
 from fba_player.view._camera import Camera
@@ -75,9 +76,10 @@ class Selection:
 class Session:
     """The state that the window and its panels share.
 
-    scene, transport, viewpoint: what is shown, its current time, and the camera. source: the file behind it.
-    selection: FAPs and BAPs. open: names of the open panels. bare: whether everything but the picture is
-    hidden. size: of the picture in pixels. scale: pixels per point of the display.
+    scene, transport, viewpoint: what is shown, its current time, and the camera. exports: see `Exports`.
+    source: the file behind it. selection: FAPs and BAPs. open: names of the open panels. bare: whether
+    everything but the picture is hidden. size: of the picture in pixels. scale: pixels per point of the
+    display.
 
     before_frame: functions called as hook(faps, baps) before each picture; they may change the values that
     will be shown in place: FAPs, float32 (68,), and BAPs, float64 (296,), zeros without a body.
@@ -119,6 +121,7 @@ class Session:
         self.recording_speed = 1.0
         self.rolling: set[str] = set()
         self.unsaved: set[str] = set()
+        self.exports = Exports(scene, self.say, self.rolling, self.unsaved)
         self.dropped: tuple[Path, ...] = ()
         self.full_screen = False
         self.popup = False

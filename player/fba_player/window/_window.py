@@ -190,6 +190,7 @@ class Window(Closing):
     def close(self) -> None:
         """Finish a film, close the window and release its resources; safe to call twice."""
         try:
+            self.session.exports.cancel()
             self.captures.close()
         finally:
             parts = (self._covering, self._gui, self._overlay, self._renderer, self._target, self._readback)
@@ -302,6 +303,7 @@ class Window(Closing):
                 self._target.close()
             self._target = Target(self._gl, size, samples=0)
         assert self._renderer is not None
+        session.exports.poll()
         self.captures.begin_picture()
         time = self.transport.time
         self._target.begin()
@@ -354,7 +356,7 @@ class Window(Closing):
         """Put the command that draws this picture onto the clipboard, and show it."""
         session, time = self.session, self.transport.time
         name = os.path.abspath(session.source.path) if session.source.path is not None else "FILE"
-        view = session.viewpoint.command(time)
+        view = session.viewpoint.command()
         text = f"fba render {shlex.quote(name)} -o picture.png --time {time:.3f} {view}"
         self._glfw.set_clipboard_string(self._window, text)
         session.say(f"Copied: {text}", seconds=8.0, about="command")
