@@ -174,9 +174,8 @@ def part(animation: Animation, start: float | None, end: float | None) -> Animat
     face, body = cut.face, cut.body
     if animation.face is not None and face is not None:
         track = animation.face[: first + 1]
-        values, mask, viseme, expression = (
-            array.copy() for array in (face.values, face.mask, face.viseme, face.expression)
-        )
+        values, mask = face.values.copy(), face.mask.copy()
+        viseme, expression = face.viseme.copy(), face.expression.copy()
         values[0] = _in_force(track.values, track.mask)
         viseme[0] = _in_force(track.viseme, track.mask[:, :1])
         expression[0] = _in_force(track.expression, track.mask[:, 1:2])
@@ -192,4 +191,4 @@ def part(animation: Animation, start: float | None, end: float | None) -> Animat
 
 def _in_force(values: Array, mask: Bool) -> Array:
     """Return the values (N,) in force at the last frame of (T, N)."""
-    return hold(values, mask, np.zeros_like(values[0]))[-1]
+    return np.asarray(hold(values, mask, np.zeros_like(values[0]))[-1])
