@@ -105,7 +105,7 @@ ILLUSTRATIONS = {
     ("docs/persona.md", "python -m tools.persona.blind_test"): "takes minutes; tests/persona has fewer takes",
     ("docs/persona.md", "python -m tools.persona.training -o default.recogniser"): "trains for a minute",
     ("docs/play.md", "fba play face.fba"): WINDOW,
-    ("docs/play.md", "fba play face.fba --paused"): WINDOW,
+    ("docs/play.md", "fba play"): WINDOW,
     ("docs/play.md", "fba play face.fba --audio voice.mp3 --audio-offset -0.04"): WINDOW,
     ("docs/play.md", "fba play hello.fap small.fba"): WINDOW,
     ("docs/play.md", "nc host 7000 | fba play -"): ARRIVING,

@@ -8,7 +8,7 @@ from imgui_bundle import imgui, implot
 
 from fba_player._ui import theme
 from fba_player._ui._bar import Bar
-from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_recording, live_message
+from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_work, live_message
 from fba_player._ui._imgui_renderer import ImguiRenderer
 from fba_player._ui._panel_windows import PanelWindows
 from fba_player._ui.panels.registry import make_panels
@@ -126,7 +126,7 @@ class Gui:
         session = self.session
         self._hide(io)
         below = self._bar_height(display)
-        taken = draw_recording(session)
+        taken = draw_work(session)
         if self.shown > 0 and self._plays:
             imgui.push_style_var(imgui.StyleVar_.alpha, self.shown)
             self.bar.draw(session, display)

@@ -475,3 +475,15 @@ def test_escape_leaves_the_full_screen_first(opened: Opened, talking: Animation)
     session.full_screen = True
     session.escape()
     assert (list(session.requests), session.closing) == (["fullscreen"], False)
+
+
+def test_escape_closes_the_help_and_ends_a_film_before_the_window(opened: Opened, talking: Animation) -> None:
+    session = opened(talking, "help").session
+    session.recording = 1.0
+    session.escape()
+    assert ("help" in session.open, list(session.requests)) == (False, [])
+    session.escape()
+    assert (list(session.requests), session.closing) == (["record"], False)
+    session.recording = None
+    session.escape()
+    assert session.closing
