@@ -39,8 +39,7 @@ class _Goal:
         type=click.IntRange(1, MAX_LEVELS),
         metavar="N",
         help="Keep all triangles, and store up to N coarser levels beside them, each with 0.32 of the "
-        "triangles of the one before, for programs that read FBA_face. `fba play` makes coarser meshes of its "
-        "own.",
+        "triangles of the one before, for programs that read FBA_face. `fba play` makes its own.",
     )
 
     def check(self) -> None:

@@ -74,7 +74,8 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
     name = session.source.name or session.scene.title
     message = live_message(session)
     facts = message or _facts(session)
-    if imgui.calc_text_size(name + facts).x + x > (room if message else min(room, MAX_NAME_SHARE * display[0])):
+    right = room if message else min(room, MAX_NAME_SHARE * display[0])
+    if imgui.calc_text_size(name + facts).x + x > right:
         facts = ""
     while name and imgui.calc_text_size(name).x + x > room:
         name = name[: max(len(name) - 8, 0)]
