@@ -25,7 +25,7 @@ from fba.cli.outputs import (
     output_option,
 )
 from fba.cli.printing import Progress, colour_grade, print_json
-from fba.cli.subcommands import model_learn_fit
+from fba.cli.subcommands import model_learn_fit, model_photos
 from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
@@ -102,6 +102,7 @@ class _Mesh:
         "fba model points scan.obj -o scan.points.csv",
         "fba model import scan.obj --points scan.points.csv -o head.glb",
         "fba model fit person.fdp -o person.glb",
+        "fba model photos front.jpg side.jpg -o me.glb --edit me.points.json",
         "fba model learn-fit talk.fba -o ada.glb",
     ),
 )
@@ -110,6 +111,7 @@ def command() -> None:
 
 
 command.add_command(model_learn_fit.command)
+command.add_command(model_photos.command)
 
 
 def _read_or_default(file: Path | None, default: bool) -> FaceModel:

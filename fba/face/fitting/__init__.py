@@ -1,0 +1,23 @@
+"""A head from photographs: points on a frontal picture and a profile, the head that fits, and its skin.
+
+front = Photo(read_photograph("me.jpg"), read_photo_points("me.points.json")["front"])
+head_from_photos(front).model.save("me.glb")
+"""
+
+from fba.face.fitting._head import Photo, PhotoHead, head_from_photos
+from fba.face.fitting._measures import Measure
+from fba.face.fitting._photographs import Photograph, read_photograph
+from fba.face.fitting._points_file import FRONT_POINTS, SIDE_POINTS, read_photo_points, write_photo_points
+
+__all__ = [
+    "FRONT_POINTS",
+    "SIDE_POINTS",
+    "Measure",
+    "Photo",
+    "PhotoHead",
+    "Photograph",
+    "head_from_photos",
+    "read_photo_points",
+    "read_photograph",
+    "write_photo_points",
+]
