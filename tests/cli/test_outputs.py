@@ -70,7 +70,8 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 writing.add(name)
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
-        "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model photos", "model points",
+        "encode", "decode", "convert", "render", "gait", "model import", "model fit",
+        "model photos", "model points",
         "conformance", "capture", "markers", "express", "model learn-fit", "emote", "emotion",
         "persona learn", "persona play", "export", "send",
     }  # fmt: skip

@@ -16,7 +16,7 @@ from fba.cli.outputs import Output, Outputs, check_glb, display_name, further_ou
 from fba.cli.printing import Progress
 
 if TYPE_CHECKING:
-    from fba.face.fitting import Photo, PhotoHead, Photograph
+    from fba.face.fitting import Photo, Photograph, PhotoHead
 
 Places = dict[str, dict[str, tuple[float, float]]]
 
@@ -77,7 +77,7 @@ def command(
 ) -> None:
     """Fit the built-in head to a person in photographs, with the skin that they show; every FAP moves it.
 
-    FRONT shows the face from the front, at rest, mouth closed; SIDE, its profile from either side, adds depth.
+    FRONT shows the face from the front, at rest, mouth closed; SIDE, its profile, adds depth.
     Points are positions of feature points of MPEG-4 in pixels. Look at the result: with --show-steps, or with
     `fba play --model OUT.glb`.
     """
@@ -128,9 +128,7 @@ def _outputs(target: _Target, inputs: list[Path | None]) -> Outputs:
     return outputs
 
 
-def _places(
-    target: _Target, given: _Given, photographs: list[Photograph]
-) -> tuple[Places, list[Any]]:
+def _places(target: _Target, given: _Given, photographs: list[Photograph]) -> tuple[Places, list[Any]]:
     """Return the points by view to begin with, and the pictures of how they were found."""
     from fba.face import fitting
 
@@ -195,12 +193,22 @@ def _values(head: PhotoHead, output: Path) -> dict[str, Any]:
     return {
         "output": str(output),
         "views": [
-            {"yaw": view.degrees[0], "pitch": view.degrees[1], "errors": {k: 1000 * v for k, v in off.items()}}
+            {
+                "yaw": view.degrees[0],
+                "pitch": view.degrees[1],
+                "errors": {k: 1000 * v for k, v in off.items()},
+            }
             for view, off in zip(head.views, head.errors, strict=True)
         ],
         "skin_seen": head.seen,
         "measures": [
-            {"view": one.view, "name": one.name, "value": one.value, "built_in": one.usual, "degrees": one.angle}
+            {
+                "view": one.view,
+                "name": one.name,
+                "value": one.value,
+                "built_in": one.usual,
+                "degrees": one.angle,
+            }
             for one in head.measures
         ],
     }

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Float64
 from fba.errors import ModelError, warn
 from fba.face import FaceModel
 from fba.face.calibration import fit
@@ -15,7 +14,7 @@ from fba.face.fitting._measures import Measure, measure
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import HIDDEN, Points, check_inside
 from fba.face.fitting._skin import paint
-from fba.face.fitting._views import NOISE, Observation, View, first_view, fit_views, solve
+from fba.face.fitting._views import Observation, View, first_view, fit_views, solve
 from fba.parameters import point_rows
 
 DISTANCE = 1.5
@@ -136,8 +135,8 @@ def check_view(view: str, photo: Photo) -> None:
             )
         if left < right:
             raise ModelError(
-                f"{where}: the left pupil (3.5) must be right of the right pupil (3.6) in the picture, as the "
-                "subject faces the camera; are they exchanged, or is the picture mirrored?"
+                f"{where}: the left pupil (3.5) must be right of the right pupil (3.6) in the picture, as "
+                "the subject faces the camera; are they exchanged, or is the picture mirrored?"
             )
 
 
@@ -151,15 +150,24 @@ def _observe(points: Points, *, right: bool = False) -> Observation:
 
 def _profile_side(side: Photo) -> float:
     """Return 1 for a profile that shows the subject's left side, -1 for its right. ModelError if neither."""
-    front = [side.points[name][0] for name in ("9.3", "9.15", "8.1", "2.10") if name in side.points]
-    back = [side.points[name][0] for name in ("10.5", "10.9", "2.13", "3.7", "8.3", "11.6") if name in side.points]
     where = side.photograph.name or "the picture"
-    if not front or not back:
+
+    def column(*names: str) -> float:
+        known = [side.points[name][0] for name in names if name in side.points]
+        return float(np.mean(known)) if known else float("nan")
+
+    middle, behind = (
+        column("9.3", "9.15", "8.1", "2.10"),
+        column("10.5", "10.9", "2.13", "3.7", "8.3", "11.6"),
+    )
+    ahead = middle - behind
+    if np.isnan(ahead):  # of the middle alone, the tip of the nose is foremost
+        ahead = column("9.3") - column("9.15", "8.1", "2.2", "2.10")
+    if np.isnan(ahead):
         raise ModelError(
-            f"{where} (side): a profile needs a point of the middle (9.3, 9.15, 8.1 or 2.10) and one behind it "
-            "(3.7, 8.3, 2.13, 10.5, 10.9 or 11.6)"
+            f"{where} (side): a profile needs the tip of the nose (9.3) and a point behind it, such as 9.15, "
+            "8.3 or 10.5"
         )
-    ahead = float(np.mean(front) - np.mean(back))
     if abs(ahead) < 0.005 * side.photograph.size[0]:
         raise ModelError(f"{where} (side): the nose is not beside the cheek; is this the frontal picture?")
     return -1.0 if ahead > 0 else 1.0

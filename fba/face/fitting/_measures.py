@@ -63,15 +63,16 @@ def _measure(model: FaceModel) -> list[tuple[str, str, float, bool]]:
 
     wide = apart(point("10.9"), point("10.10"))
     eyes = (apart(point("3.7"), point("3.11")) + apart(point("3.8"), point("3.12"))) / 2
+    upper, tall = apart(at["8"], at["10"]), apart(at["4"], at["9"])
     lids = (apart(point("3.1"), point("3.3")) + apart(point("3.2"), point("3.4"))) / 2
     return [
         ("profile", "angle at the chin, 1-2-3", angle("1", "2", "3"), True),
         ("profile", "angle at the tip of the nose, 7-8-9", angle("7", "8", "9"), True),
-        ("profile", "upper face to lower, d(8,10) / d(2,8)", apart(at["8"], at["10"]) / apart(at["2"], at["8"]), False),
+        ("profile", "upper face to lower, d(8,10) / d(2,8)", upper / apart(at["2"], at["8"]), False),
         ("profile", "angle at the upper lip, 5-6-7", angle("5", "6", "7"), True),
         ("profile", "angle at the lower lip, 3-4-5", angle("3", "4", "5"), True),
         ("profile", "angle between the lips, 4-5-6", angle("4", "5", "6"), True),
-        ("front", "width of the face to its height, d(14,15) / d(4,9)", wide / apart(at["4"], at["9"]), False),
+        ("front", "width of the face to its height, d(14,15) / d(4,9)", wide / tall, False),
         ("front", "between the eyes, d(12,13)", apart(point("3.5"), point("3.6")) / wide, False),
         ("front", "width of the mouth, d(5a,5b)", apart(point("8.3"), point("8.4")) / wide, False),
         ("front", "height of the mouth, d(4,6)", apart(at["4"], at["6"]) / wide, False),

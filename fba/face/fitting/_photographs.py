@@ -67,7 +67,9 @@ def read_photograph(path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LI
                 )
             image.draft("RGB", (LARGEST_SIDE, LARGEST_SIDE))  # JPEG is decoded at a fraction of its size
             if image.mode.startswith("I") or image.mode == "F":
-                raise FormatError(f"its pixels are of the kind {image.mode}, not colours of 8 bits", path=path)
+                raise FormatError(
+                    f"its pixels are of the kind {image.mode}, not colours of 8 bits", path=path
+                )
             image.thumbnail((LARGEST_SIDE, LARGEST_SIDE), Image.Resampling.LANCZOS)
             upright = ImageOps.exif_transpose(image).convert("RGB")
     except FileNotFoundError as error:

@@ -101,14 +101,23 @@ def paint(
     pixels = np.round(_to_srgb(result) * 255).astype(np.uint8)
     face = _face_texels(model, surface, corner)
     seen = float((shown[face] > 0.5).mean()) if face.any() else 0.0
-    return replace(model, parts=tuple(_with_texture(one, pixels) if one is part else one for one in model.parts)), seen
+    return replace(
+        model, parts=tuple(_with_texture(one, pixels) if one is part else one for one in model.parts)
+    ), seen
 
 
 class _Layer:
     """What one photograph shows of the skin."""
 
     def __init__(
-        self, surface: _Surface, model: FaceModel, photograph: Photograph, view: View, *, first: bool, alone: bool
+        self,
+        surface: _Surface,
+        model: FaceModel,
+        photograph: Photograph,
+        view: View,
+        *,
+        first: bool,
+        alone: bool,
     ) -> None:
         self.view, self.first = view, first
         self.scale = photograph.scale
@@ -167,7 +176,7 @@ def _bilinear(pixels: UInt8, x: Float64, y: Float64) -> Float32:
 
 
 def _depths(model: FaceModel, photograph: Photograph, view: View) -> tuple[Float32, float]:
-    """Return the nearest depths (H, W) of the head in a small copy of the picture, and pixels for one of it."""
+    """Return the nearest depths (H, W) of the head in a small copy of the picture, and its scale."""
     factor = DEPTH_SIDE / max(photograph.size)
     width, height = (max(round(side * factor), 1) for side in photograph.size)
     vertices = model.vertices.astype(np.float64)
@@ -259,7 +268,9 @@ def _even(below: Float32, above: Float32, weight: Float32, own: Float32) -> Floa
         for channel in range(3):
             with np.errstate(divide="ignore"):
                 tones = [
-                    np.log(np.maximum(_shrink(one[..., channel] * weight * kind) / np.maximum(share, 1e-6), 1e-4))
+                    np.log(
+                        np.maximum(_shrink(one[..., channel] * weight * kind) / np.maximum(share, 1e-6), 1e-4)
+                    )
                     for one in (above, below)
                 ]
             ratio = np.clip(tones[0] - tones[1], -TONE_RANGE, TONE_RANGE)
@@ -298,6 +309,7 @@ def _grow(field: Float64) -> Float64:
 
 def _face_texels(model: FaceModel, surface: _Surface, corner: Int32) -> Bool:
     """Return the mask (SIZE, SIZE) of the texels between hairline, ears and chin."""
+
     def at(name: str) -> Float64:
         return np.asarray(model.points[point_rows()[name]])
 
@@ -329,4 +341,6 @@ def _to_linear(values: Float32) -> Float32:
 
 def _to_srgb(values: Float32) -> Float32:
     values = np.clip(values, 0, 1)
-    return np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055).astype(np.float32)
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055).astype(
+        np.float32
+    )

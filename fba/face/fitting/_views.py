@@ -18,6 +18,8 @@ SPREADS = ((0.090, 0.006), (0.035, 0.004), (0.004, 0.0012))
 ASYMMETRY = 0.2
 """Differences between the two sides of a face, as a share of those between faces."""
 ROUNDS = 25
+TURN_STEP = 0.17
+"""Usual turn of a camera in a round, radians: a profile of the middle alone hardly shows it."""
 ROBUST = 3.0
 """Points that are further off than this many times the usual error count less."""
 
@@ -90,18 +92,27 @@ def fit_views(shape: Float64, views: Sequence[View], seen: Sequence[Observation]
 
 
 def solve(
-    template: Float64, views: Sequence[View], seen: Sequence[Observation], *, rigid: bool = False
+    template: Float64,
+    views: Sequence[View],
+    seen: Sequence[Observation],
+    *,
+    rigid: bool = False,
+    noise: float = NOISE,
+    hidden: bool = False,
 ) -> tuple[Float64, list[View]]:
     """Return (points (84, 3), views): the most likely head near a template that the views show as observed.
 
     Gauss-Newton over views and shape at once; the shape differs from the template smoothly and nearly alike
-    on both sides (see `SPREADS`). Points that no view shows stay NaN. rigid: the shape is known.
+    on both sides (see `SPREADS`). rigid: the shape is known. noise: error of the observed places, metres on
+    the face. hidden: whether points that no view shows are estimated, too; otherwise they are NaN.
     """
     rows = sorted({row for one in seen for row in one.rows})
+    if hidden:
+        rows = np.flatnonzero(np.isfinite(template[:, 0])).tolist()
     number = {row: k for k, row in enumerate(rows)}
     base = template[rows]
     size = 0 if rigid else 3 * len(rows)
-    prior = np.zeros((0, 0)) if rigid else np.linalg.inv(_covariance(base))
+    prior = np.zeros((0, 0)) if rigid else np.linalg.inv(face_covariance(base))
     moved = np.zeros((len(rows), 3))
     views = list(views)
     count = size + 6 * len(views)
@@ -113,9 +124,9 @@ def solve(
             at = np.array([number[row] for row in one.rows])
             off = one.places - view.project(base[at] + moved[at])
             by_point, by_view = _slopes(view, base[at] + moved[at])
-            error = np.linalg.norm(off, axis=1) / (NOISE * view.scale)
+            error = np.linalg.norm(off, axis=1) / (noise * view.scale)
             limit = ROBUST * max(float(np.median(error)), 1.0)
-            weight = np.minimum(1.0, limit / np.maximum(error, 1e-12)) / (NOISE * view.scale) ** 2
+            weight = np.minimum(1.0, limit / np.maximum(error, 1e-12)) / (noise * view.scale) ** 2
             whole = np.zeros((len(at), 2, count))
             if size:
                 for axis in range(3):
@@ -125,7 +136,8 @@ def solve(
             scaled = flat * np.repeat(weight, 2)[:, None]
             normal += scaled.T @ flat
             right += scaled.T @ off.ravel()
-        normal[np.arange(size, count), np.arange(size, count)] *= 1 + 1e-9
+        turns = [size + 6 * v + axis for v in range(len(views)) for axis in range(3)]
+        normal[turns, turns] += 1 / TURN_STEP**2
         change = np.linalg.solve(normal + 1e-9 * np.eye(count), right)
         moved = moved + change[:size].reshape(-1, 3) if size else moved
         for v, view in enumerate(views):
@@ -171,7 +183,7 @@ def _slopes(view: View, points: Float64) -> tuple[Float64, Float64]:
     return camera @ view.rotation, by_view
 
 
-def _covariance(points: Float64) -> Float64:
+def face_covariance(points: Float64) -> Float64:
     """Return (3K, 3K): how the points (K, 3) of one face differ from another's, square metres."""
     mirror = points * (-1.0, 1.0, 1.0)
     result = np.zeros((len(points), 3, len(points), 3))
