@@ -45,8 +45,9 @@ SIZES = 1.12
 """Ratio of successive sizes."""
 FACE_SCORE = 0.5
 """Least likeness, 0 to 1, to the template of a whole face."""
-CANDIDATES = 24
-"""Places like a whole face whose points are looked at, at most; two of each size."""
+CANDIDATES = 60
+"""Places like a whole face whose points are looked at, at most."""
+OF_EACH_SIZE = 6
 LARGER = 0.05
 """Likeness that a face of twice the size has ahead: portraits show large faces."""
 SURE = (
@@ -170,9 +171,9 @@ def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8
 
 
 def _maxima(likeness: Float64) -> list[tuple[int, int]]:
-    """Return rows and columns of the three highest local maxima."""
+    """Return rows and columns of the four highest local maxima."""
     peaks = np.argwhere((likeness == maximum_filter(likeness, 5)) & (likeness > 0))
-    order = np.argsort(-likeness[tuple(peaks.T)], kind="stable")[:3]
+    order = np.argsort(-likeness[tuple(peaks.T)], kind="stable")[:4]
     return [(int(y), int(x)) for y, x in peaks[order]]
 
 
@@ -185,7 +186,7 @@ def _distinct(
     for one in best:
         size = float(np.linalg.norm(one[2]))
         bucket = round(np.log(size) / np.log(SIZES**2))
-        if sizes.get(bucket, 0) < 2 and all(
+        if sizes.get(bucket, 0) < OF_EACH_SIZE and all(
             np.linalg.norm(one[1] - other[1]) > 0.25 * size or np.linalg.norm(one[2] - other[2]) > 0.18 * size
             for other in result
         ):
@@ -198,7 +199,7 @@ def _distinct(
 
 def _likeness(grey: Float64, middle: Float64, across: Float64) -> float:
     """Return how like those of a face the points around two eyes are, 0 to 1."""
-    _, likeness = _search(even(standard_face(grey, middle, across), LOCAL), {}, 1.0, 4.0, SURE)
+    _, likeness = _search(even(standard_face(grey, middle, across), LOCAL), {}, 1.0, 4.0, SURE, phases=False)
     return float(np.mean(list(likeness.values())))
 
 
@@ -229,10 +230,12 @@ def _search(
     share: float,
     least: float,
     names: tuple[str, ...] = POINTS,
+    *,
+    phases: bool = True,
 ) -> tuple[dict[str, Float64], dict[str, float]]:
     """Return the likeliest places (2,) of points in an evened face of standard size, and their likeness."""
     known = features()
-    responses = gabor(face)
+    responses = gabor(face) if phases else None
     found, likeness = {}, {}
     first, second, third, fourth = WEIGHTS
     for name in names:
@@ -240,9 +243,9 @@ def _search(
         usual, spread = known.place(name)
         centre = expected.get(name, usual + MIDDLE)
         half = np.maximum(REGION * share * spread, least)
-        mean, vectors, phases = known.means[number], known.vectors[number], known.phases[number]
+        mean, vectors, prototype = known.means[number], known.vectors[number], known.phases[number]
         if mirrored:
-            mean, vectors, phases = mean[:, ::-1], vectors[:, :, ::-1], mirror_phases(phases)
+            mean, vectors, prototype = mean[:, ::-1], vectors[:, :, ::-1], mirror_phases(prototype)
         low = np.maximum(np.floor(centre - half).astype(int), PATCH)
         high = np.minimum(np.ceil(centre + half).astype(int) + 1, np.array(face.shape[::-1]) - PATCH)
         if (high - low < 1).any():
@@ -252,10 +255,11 @@ def _search(
         along, distance = (
             one[PATCH:-PATCH, PATCH:-PATCH] for one in subspace(face[rows, columns], mean, vectors)
         )
-        phase = phase_distance(responses[:, low[1] : high[1], low[0] : high[0]], phases)
         y, x = np.mgrid[low[1] : high[1], low[0] : high[0]]
         away = ((x - centre[0]) / half[0]) ** 2 + ((y - centre[1]) / half[1]) ** 2
-        score = first * along - second * distance - third * phase - fourth * away
+        score = first * along - second * distance - fourth * away
+        if responses is not None:
+            score -= third * phase_distance(responses[:, low[1] : high[1], low[0] : high[0]], prototype)
         top = np.unravel_index(int(score.argmax()), score.shape)
         found[name] = _peak(score, top) + low
         likeness[name] = float(np.clip(along[top], 0, 1))

@@ -26,6 +26,8 @@ FEWEST = {"front": 8, "side": 5}
 """Least number of points in each view."""
 MAX_TURN = {"front": 30.0, "side": 30.0}
 """Degrees by which a camera may be off the front or the side before the user is warned."""
+OTHER_VIEW = 50.0
+"""Degrees beyond which it cannot be that view at all."""
 MISPLACED = 0.012
 """Metres by which a point is off the fitted head that is told to the user."""
 MIRRORED_NAMES = {"3.5": "3.6", "3.7": "3.12", "8.3": "8.4", "2.13": "2.14", "10.9": "10.10", "10.5": "10.6"}
@@ -177,6 +179,12 @@ def _check_views(names: list[str], views: list[View]) -> None:
     for name, view in zip(names, views, strict=True):
         yaw, pitch = view.degrees
         off = abs(yaw) if name == "front" else abs(abs(yaw) - 90)
+        if off > OTHER_VIEW:
+            other = "profile" if name == "front" else "frontal picture"
+            raise ModelError(
+                f"the {name} picture seems to be taken from {abs(yaw):.0f} degrees beside the face; is this the "
+                f"{other}? Give the frontal picture first, then the profile"
+            )
         if max(off, abs(pitch)) > MAX_TURN[name]:
             warn(
                 f"the {name} picture seems to be taken from {abs(yaw):.0f} degrees beside and {pitch:.0f} "

@@ -15,7 +15,7 @@ from fba.capture.points.places import point_places, take_points
 from fba.errors import FbaError, ModelError
 from fba.face.feature_points import FREE_POINTS
 from fba.face.feature_points import names as feature_point_names
-from fba.formats.face_tables import _tracked_points as tracked_points
+from fba.formats import read_face
 from fba.parameters import point_rows
 from fba.text_files import read_bytes
 
@@ -125,7 +125,7 @@ def _view_points(content: Any, where: str) -> dict[str, tuple[float, float]]:
 
 def _landmarks(path: str | os.PathLike[str], size: tuple[int, int] | None) -> dict[str, tuple[float, float]]:
     """Return the feature points among a landmark program's points in the first frame with a face."""
-    motion = tracked_points.read_points(os.fspath(path), source_rate=30)
+    motion = read_face(os.fspath(path), format="points", source_rate=30)
     frames = np.flatnonzero(motion.seen)
     if not len(frames):
         raise ModelError(f"{path}: no face was seen; there are no points to take")

@@ -18,6 +18,7 @@ from fba.face.fitting._views import (
     fit_views,
     solve,
 )
+from fba.geometry import fit_similarity
 from fba.parameters import point_rows
 from fba.rotations import turn
 
@@ -87,8 +88,10 @@ def test_two_views_show_a_head_s_depth(side: float) -> None:
     first = [first_view(BASE, seen[0], 1.5), first_view(BASE, seen[1], 1.5, side=side)]
     found, views = solve(BASE, fit_views(BASE, first, seen), seen)
     rows = [point_rows()[name] for name in FRONT_POINTS]
-    away = np.linalg.norm(found[rows] - points[rows], axis=1)
-    alone = np.linalg.norm(BASE[rows] - points[rows], axis=1)
+    away, alone = (
+        np.linalg.norm(fit_similarity(one[rows], points[rows]).apply(one[rows]) - points[rows], axis=1)
+        for one in (found, BASE)
+    )
     assert away.mean() < 0.4 * alone.mean()
     for view, one in zip(views, seen, strict=True):
         off = np.linalg.norm(view.project(found[one.rows]) - one.places, axis=1) / view.scale
