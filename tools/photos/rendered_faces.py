@@ -37,11 +37,11 @@ def rendered_faces(count: int, seed: int) -> Iterator[tuple[UInt8, Float64]]:
     for _ in range(count):
         head = None
         while head is None:
-            head = _varied_head(random)
+            head = varied_head(random)
         yield _photographed(head, random)
 
 
-def _varied_head(random: np.random.Generator) -> FaceModel | None:
+def varied_head(random: np.random.Generator) -> FaceModel | None:
     """Return the built-in head in another shape and other colours; None if the shape is impossible."""
     base = FaceModel.default()
     outer = [row for name, row in point_rows().items() if name not in INNER]

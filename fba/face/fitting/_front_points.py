@@ -43,7 +43,7 @@ LARGEST = 0.5
 SMALLEST = 0.06
 SIZES = 1.12
 """Ratio of successive sizes."""
-FACE_SCORE = 0.5
+FACE_SCORE = 0.58
 """Least likeness, 0 to 1, to the template of a whole face."""
 CANDIDATES = 60
 """Places like a whole face whose points are looked at, at most."""
@@ -148,7 +148,9 @@ def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8
     if not best:
         raise ModelError(f"{name or 'the picture'}: is too small for a face to be found")
     best.sort(key=lambda one: -one[0])
-    candidates = _distinct(best)
+    candidates = _distinct([one for one in best if _is_inside(one[1], one[2], grey.shape)])
+    if not candidates:
+        raise ModelError(f"{name or 'the picture'}: no face was found; place its points by hand")
     scored = [(_likeness(grey, place, size), place, size) for _, place, size in candidates]
     scored.sort(key=lambda one: -one[0] - LARGER * np.log2(np.linalg.norm(one[2])))
     score, middle, across = scored[0]
@@ -168,6 +170,13 @@ def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8
             )
             break
     return middle, across, score, _grey_picture(shown / max(float(shown.max()), 1e-9))
+
+
+def _is_inside(middle: Float64, across: Float64, shape: tuple[int, ...]) -> bool:
+    """Whether a face with these eyes, from brows to chin, is inside a picture of this shape."""
+    down = np.array([-across[1], across[0]])
+    corners = np.array([middle + a * across + b * down for a in (-0.9, 0.9) for b in (-0.6, 1.6)])
+    return bool((corners >= 0).all() and (corners <= np.array(shape[1::-1])).all())
 
 
 def _maxima(likeness: Float64) -> list[tuple[int, int]]:

@@ -182,8 +182,8 @@ def _check_views(names: list[str], views: list[View]) -> None:
         if off > OTHER_VIEW:
             other = "profile" if name == "front" else "frontal picture"
             raise ModelError(
-                f"the {name} picture seems to be taken from {abs(yaw):.0f} degrees beside the face; is this the "
-                f"{other}? Give the frontal picture first, then the profile"
+                f"the {name} picture seems to be taken from {abs(yaw):.0f} degrees beside the face; is this "
+                f"the {other}? Give the frontal picture first, then the profile"
             )
         if max(off, abs(pitch)) > MAX_TURN[name]:
             warn(

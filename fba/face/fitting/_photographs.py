@@ -36,7 +36,7 @@ class Photograph:
     @property
     def scale(self) -> float:
         """Pixels of the file for one of `pixels`."""
-        return self.size[0] / self.pixels.shape[1]
+        return self.size[0] / int(self.pixels.shape[1])
 
     @property
     def grey(self) -> bool:

@@ -20,9 +20,11 @@ SMOOTH = 1.6
 """Rows over which the outline is smoothed."""
 LEAST_SHARE, MOST_SHARE = 0.08, 0.9
 """Share of the picture that a head covers."""
+SLOPES = (0.0, 0.15, 0.3, 0.45)
+"""Slants of the outline, tried one after another, at which its extrema are looked for."""
 LIP_SHARE = (0.32, 0.72)
 """Range of the height of the mouth between the tip of the nose (0) and the boss of the chin (1)."""
-FLATNESS = 0.75
+FLATNESS = 0.9
 """Largest depth of nose, lips and chin as a share of the height from nose to chin."""
 LEAST_HEIGHT = 0.06
 """Least height from nose to chin as a share of the picture's."""
@@ -47,7 +49,12 @@ def find_side_points(photograph: Photograph) -> FoundPoints:
             best = (sharp, facing, signal, nose)
     assert best is not None
     sharp, facing, signal, nose = best
-    found = _extrema(signal, nose) if sharp > 0 else {}
+    down = np.arange(len(signal)) - nose
+    found: dict[str, float] = {}
+    for slope in SLOPES if sharp > 0 else ():  # where a chin recedes, it is an extremum of a slanted outline
+        found = _extrema(signal + slope * down, nose)
+        if _is_face(found, signal):
+            break
     if not _is_face(found, signal):
         raise ModelError(
             f"{name}: its outline is not that of a face in profile: no nose, lips and chin were found in "
@@ -58,7 +65,10 @@ def find_side_points(photograph: Photograph) -> FoundPoints:
     for point, y in found.items():
         x = signal[round(y)]
         column = x if facing > 0 else width - 1 - x
-        places[point] = ((column + 0.5) * step * photograph.scale, (y + 0.5) * step * photograph.scale)
+        places[point] = (
+            float((column + 0.5) * step * photograph.scale),
+            float((y + 0.5) * step * photograph.scale),
+        )
     step_shown = Step("The profile as a curve, and its extrema", _draw(mask, found, signal, facing))
     return FoundPoints(places, 1.0, [step_shown])
 

@@ -158,7 +158,11 @@ def solve(
 def _turned(rotation: Float64, vector: Float64) -> Float64:
     """Return a rotation followed by one about a vector (3,), whose length is the angle in radians."""
     angle = float(np.linalg.norm(vector))
-    return rotation if angle < 1e-12 else np.asarray(rotation_about(vector / angle, angle) @ rotation)
+    return (
+        rotation
+        if angle < 1e-12
+        else np.asarray(rotation_about(vector / angle, np.asarray(angle)) @ rotation)
+    )
 
 
 def _slopes(view: View, points: Float64) -> tuple[Float64, Float64]:
