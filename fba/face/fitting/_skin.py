@@ -54,6 +54,8 @@ HAIR = 0.055
 """Linear luminance of the built-in skin below which it is hair."""
 TONE_RANGE = 1.2
 """Largest difference of tones that is evened, as a natural logarithm."""
+REFLECTED = np.float32(0.72)
+"""Share of the light that skin reflects when photographs show it at their own brightness."""
 QUALITY = 92
 
 
@@ -160,7 +162,7 @@ class _Layer:
         line = np.clip(grid[..., 1].astype(np.intp), 0, self._depth.shape[0] - 1)
         open_ = view.depth(places) > self._depth[line, column] - HIDDEN_DEPTH
         weight = share * smoothstep((facing - low) / (high - low)) * inside * open_
-        return _to_linear(_bilinear(self.pixels, x, y) / 255), weight.astype(np.float32)
+        return REFLECTED * _to_linear(_bilinear(self.pixels, x, y) / 255), weight.astype(np.float32)
 
 
 def _bilinear(pixels: UInt8, x: Float64, y: Float64) -> Float32:

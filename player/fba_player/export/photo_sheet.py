@@ -23,8 +23,8 @@ from fba_player.view._camera import Camera
 CELL = (360, 440)
 LABEL = 18
 DOT = (40, 220, 90)
-VIEWS = (("from the front", 0.0, {}), ("three-quarter", 40.0, {}), ("profile", 90.0, {}),
-         ("speaking", -15.0, {3: 260, 4: -120, 5: 160, 53: 100, 54: 100}))  # fmt: skip
+VIEWS: tuple[tuple[str, float, dict[int, float]], ...] = (("from the front", 0.0, {}), ("three-quarter", 40.0, {}), ("profile", 90.0, {}),
+         ("speaking", -15.0, {3: 420, 4: -90, 5: -320, 8: -60, 9: -60, 10: -220, 11: -220}))  # fmt: skip
 """Titles, degrees around the head and FAPs of the pictures of the finished head."""
 
 
@@ -49,8 +49,9 @@ def photo_sheet(photos: Sequence[Photo], head: PhotoHead, steps: Sequence[Step] 
     sheet = Image.new("RGB", layout.size, PAPER)
     pen = ImageDraw.Draw(sheet)
     for (title, picture), (x, y) in zip(cells, layout.corners, strict=True):
-        small = picture.convert("RGB")
-        small.thumbnail(CELL)
+        factor = min(CELL[0] / picture.width, CELL[1] / picture.height)
+        fitted = (max(round(picture.width * factor), 1), max(round(picture.height * factor), 1))
+        small = picture.convert("RGB").resize(fitted)
         sheet.paste(small, (x + (CELL[0] - small.width) // 2, y + LABEL))
         pen.text((x + 4, y + 3), title[:58], fill=TEXT)
     return np.asarray(sheet)

@@ -81,7 +81,9 @@ def colour_at(made: Made, name: str) -> np.ndarray:
 
 def test_its_skin_is_that_of_the_photographs(made: Made) -> None:
     for name in ("9.3", "8.1", "2.10"):
-        assert colour_at(made, name) == pytest.approx([200, 120, 100], abs=12)
+        assert colour_at(made, name) == pytest.approx(
+            [172, 103, 85], abs=12
+        )  # the photograph's 200, 120, 100 without the light
     # The profile serves both sides, in the tone of the front.
     left, right = colour_at(made, "10.7"), colour_at(made, "10.8")
     assert left == pytest.approx(right, abs=12)
