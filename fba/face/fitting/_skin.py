@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from fba.arrays import Bool, Float32, Float64, Int32, UInt8
+from fba.arrays import Bool, Float32, Float64, Floating, Int32, UInt8
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.face.fitting._photographs import Photograph
@@ -285,7 +285,7 @@ def _even(below: Float32, above: Float32, weight: Float32, own: Float32) -> Floa
 def _shrink(values: Float32) -> Float64:
     """Return the means (TONES, TONES) of the blocks of a picture (SIZE, SIZE)."""
     block = SIZE // TONES
-    return values.reshape(TONES, block, TONES, block).mean(axis=(1, 3), dtype=np.float64)
+    return np.asarray(values.reshape(TONES, block, TONES, block).mean(axis=(1, 3), dtype=np.float64))
 
 
 def _spread(values: Float64, weight: Float64) -> Float64:
@@ -297,7 +297,7 @@ def _spread(values: Float64, weight: Float64) -> Float64:
         result += share * gaussian_filter(values * weight, sigma) / np.maximum(here, 1e-9)
         done += share
     mean = float((values * weight).sum() / weight.sum())
-    return gaussian_filter(result + (1 - done) * mean, 1.0)
+    return np.asarray(gaussian_filter(result + (1 - done) * mean, 1.0))
 
 
 def _grow(field: Float64) -> Float64:
@@ -337,7 +337,7 @@ def _with_texture(part: Part, pixels: UInt8) -> Part:
     )
 
 
-def _to_linear(values: Float32) -> Float32:
+def _to_linear(values: Floating) -> Float32:
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 

@@ -23,8 +23,11 @@ from fba_player.view._camera import Camera
 CELL = (360, 440)
 LABEL = 18
 DOT = (40, 220, 90)
-VIEWS: tuple[tuple[str, float, dict[int, float]], ...] = (("from the front", 0.0, {}), ("three-quarter", 40.0, {}), ("profile", 90.0, {}),
-         ("speaking", -15.0, {3: 420, 4: -90, 5: -320, 8: -60, 9: -60, 10: -220, 11: -220}))  # fmt: skip
+SPEAKING: dict[int, float] = {3: 420, 4: -90, 5: -320, 8: -60, 9: -60, 10: -220, 11: -220}
+VIEWS: tuple[tuple[str, float, dict[int, float]], ...] = (
+    ("from the front", 0.0, {}), ("three-quarter", 40.0, {}), ("profile", 90.0, {}),
+    ("speaking", -15.0, SPEAKING),
+)  # fmt: skip
 """Titles, degrees around the head and FAPs of the pictures of the finished head."""
 
 
