@@ -26,7 +26,7 @@ LIP_SHARE = (0.32, 0.72)
 """Range of the height of the mouth between the tip of the nose (0) and the boss of the chin (1)."""
 FLATNESS = 0.9
 """Largest depth of nose, lips and chin as a share of the height from nose to chin."""
-LEAST_HEIGHT = 0.06
+LEAST_HEIGHT = 0.1
 """Least height from nose to chin as a share of the picture's."""
 NOSE_WIDTH = 0.06
 """Half height of a nose as a share of the head's."""
@@ -41,21 +41,24 @@ def find_side_points(photograph: Photograph) -> FoundPoints:
     step = max(photograph.pixels.shape[0] // ROWS, 1)
     small = photograph.pixels[::step, ::step]
     mask = _head_mask(small, name)
-    best = None
+    sides = []
     for facing in (-1, 1):
         signal = _outline(mask, facing)
         nose, sharp = _nose(signal)
-        if best is None or sharp > best[0]:
-            best = (sharp, facing, signal, nose)
-    assert best is not None
-    sharp, facing, signal, nose = best
-    down = np.arange(len(signal)) - nose
+        if sharp > 0:
+            sides.append((sharp, facing, signal, nose))
     found: dict[str, float] = {}
-    for slope in SLOPES if sharp > 0 else ():  # where a chin recedes, it is an extremum of a slanted outline
-        found = _extrema(signal + slope * down, nose)
-        if _is_face(found, signal):
+    facing, signal = 1, np.zeros(0)
+    for _, towards, outline, nose in sorted(sides, key=lambda side: -side[0]):
+        down = np.arange(len(outline)) - nose
+        for slope in SLOPES:  # where a chin recedes, it is an extremum of a slanted outline
+            extrema = _extrema(outline + slope * down, nose)
+            if _is_face(extrema, outline):
+                found, facing, signal = extrema, towards, outline
+                break
+        if found:
             break
-    if not _is_face(found, signal):
+    if not found:
         raise ModelError(
             f"{name}: its outline is not that of a face in profile: no nose, lips and chin were found in "
             "it; is the background even? Place the points by hand"
