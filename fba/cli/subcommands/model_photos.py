@@ -14,6 +14,7 @@ from fba.cli.command import Command, examples
 from fba.cli.option_fields import option, with_options
 from fba.cli.outputs import Output, Outputs, check_glb, display_name, further_output_option, output_option
 from fba.cli.printing import Progress
+from fba.errors import ModelError
 
 if TYPE_CHECKING:
     from fba.face.fitting import Photo, Photograph, PhotoHead
@@ -140,7 +141,13 @@ def _places(target: _Target, given: _Given, photographs: list[Photograph]) -> tu
     finders = {"front": fitting.find_front_points, "side": fitting.find_side_points}
     for view, photograph in zip(finders, photographs, strict=False):
         if view not in places:
-            found = finders[view](photograph)
+            try:
+                found = finders[view](photograph)
+            except ModelError:
+                if target.edit is None:
+                    raise
+                places[view] = fitting.template_points(photograph, view)  # to be dragged
+                continue
             places[view] = found.points
             steps += found.steps if target.show_steps is not None else []
     return places, steps

@@ -6,7 +6,7 @@ head_from_photos(front).model.save("me.glb")
 
 from fba.face.fitting._found import FoundPoints, Step
 from fba.face.fitting._front_points import find_front_points
-from fba.face.fitting._head import DISTANCE, Photo, PhotoHead, head_from_photos
+from fba.face.fitting._head import DISTANCE, Photo, PhotoHead, head_from_photos, template_points
 from fba.face.fitting._measures import Measure
 from fba.face.fitting._photographs import Photograph, read_photograph
 from fba.face.fitting._points_file import FRONT_POINTS, SIDE_POINTS, read_photo_points, write_photo_points
@@ -27,5 +27,6 @@ __all__ = [
     "head_from_photos",
     "read_photo_points",
     "read_photograph",
+    "template_points",
     "write_photo_points",
 ]

@@ -12,7 +12,7 @@ from fba.face import FaceModel
 from fba.face.calibration import fit
 from fba.face.fitting._measures import Measure, measure
 from fba.face.fitting._photographs import Photograph
-from fba.face.fitting._points_file import HIDDEN, Points, check_inside
+from fba.face.fitting._points_file import FRONT_POINTS, HIDDEN, SIDE_POINTS, Points, check_inside
 from fba.face.fitting._skin import paint
 from fba.face.fitting._views import Observation, View, first_view, fit_views, solve
 from fba.parameters import point_rows
@@ -112,6 +112,20 @@ def head_from_photos(
     made = "frontal photograph and profile" if side is not None else "frontal photograph"
     model = model.with_notes({"skin": f"from a {made}"})
     return PhotoHead(model, tuple(views), errors, measure(model, base), share)
+
+
+def template_points(photograph: Photograph, view: str) -> dict[str, tuple[float, float]]:
+    """Return the built-in head's points in the middle of a picture, to be dragged. view: front or side."""
+    from fba.face.builtin import default
+
+    points = default().points
+    width, height = photograph.size
+    turn = np.eye(3) if view == "front" else np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    shift = np.array([width / 2, height * 0.45]) + (0.0 if view == "front" else np.array([-0.2 * width, 0.0]))
+    seen = View(turn, min(width, height) / 0.32, shift, DISTANCE)
+    names = FRONT_POINTS if view == "front" else SIDE_POINTS
+    places = seen.project(points[[point_rows()[name] for name in names]])
+    return {name: (float(x), float(y)) for name, (x, y) in zip(names, places, strict=True)}
 
 
 def check_view(view: str, photo: Photo) -> None:

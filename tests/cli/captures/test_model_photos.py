@@ -74,6 +74,24 @@ def test_points_are_edited_before_the_head_is_made(
     assert photo.with_name("a.glb").exists()
 
 
+def test_points_that_are_not_found_are_dragged_from_a_template(
+    run: Run, photo: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[Any] = []
+
+    def show(photographs: Any, places: Any, path: Path) -> PhotoEditing:
+        shown.append(places)
+        return PhotoEditing(photographs, places, path)
+
+    monkeypatch.setattr(pages, "check_page", lambda subject: None)
+    monkeypatch.setattr(pages, "place_photo_points", show)
+    words = ("model", "photos", photo, photo, "-o", photo.with_name("a.glb"))
+    assert run(*words, "--edit", photo.with_name("new.json"))[0] == 1
+    assert set(shown[0]["front"]) == set(FRONT_POINTS)
+    assert 0 < shown[0]["front"]["2.1"][1] < 600
+    assert 0 < shown[0]["side"]["9.3"][0] < shown[0]["side"]["10.5"][0] < 500
+
+
 def test_mistakes_are_told(run: Run, photo: Path) -> None:
     out_file = photo.with_name("a.glb")
     code, _, err = run("model", "photos", photo, "-o", out_file)
