@@ -88,6 +88,7 @@ fba.formats.c3d
 fba.formats.gltf
 fba.formats.face_tables
 fba.formats.avatar
+fba.face.fitting
 fba.live._protocols
 fba.live
 fba.archive

@@ -104,6 +104,10 @@ ILLUSTRATIONS = {
     ): "takes minutes; tests/persona has fewer contents",
     ("docs/persona.md", "python -m tools.persona.blind_test"): "takes minutes; tests/persona has fewer takes",
     ("docs/persona.md", "python -m tools.persona.training -o default.recogniser"): "trains for a minute",
+    (
+        "docs/photos.md",
+        "$ fba model photos front.jpg side.jpg -o me.glb --edit me.points.json",
+    ): WINDOW,
     ("docs/play.md", "fba play face.fba"): WINDOW,
     ("docs/play.md", "fba play"): WINDOW,
     ("docs/play.md", "fba play face.fba --audio voice.mp3 --audio-offset -0.04"): WINDOW,

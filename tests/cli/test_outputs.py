@@ -70,9 +70,9 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 writing.add(name)
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
-        "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
-        "conformance", "capture", "markers", "express", "model learn-fit", "model simplify", "emote",
-        "emotion", "persona learn", "persona play", "export", "send", "find",
+        "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model photos",
+        "model points", "conformance", "capture", "markers", "express", "model learn-fit", "model simplify",
+        "emote", "emotion", "persona learn", "persona play", "export", "send", "find",
     }  # fmt: skip
 
 

@@ -25,7 +25,7 @@ from fba.cli.outputs import (
     output_option,
 )
 from fba.cli.printing import Progress, colour_grade, print_json
-from fba.cli.subcommands import model_learn_fit, model_simplify
+from fba.cli.subcommands import model_learn_fit, model_photos, model_simplify
 from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
@@ -102,6 +102,7 @@ class _Mesh:
         "fba model points scan.obj -o scan.points.csv",
         "fba model import scan.obj --points scan.points.csv -o head.glb",
         "fba model fit person.fdp -o person.glb",
+        "fba model photos front.jpg side.jpg -o me.glb --edit me.points.json",
         "fba model learn-fit talk.fba -o ada.glb",
         "fba model simplify head.glb -o small.glb --ratio 0.1",
     ),
@@ -111,6 +112,7 @@ def command() -> None:
 
 
 command.add_command(model_learn_fit.command)
+command.add_command(model_photos.command)
 command.add_command(model_simplify.command)
 
 

@@ -7,7 +7,7 @@ from fba_player._ui.panels._differences_panel import DifferencesPanel
 from fba_player._ui.panels._file_panel import FilePanel
 from fba_player._ui.panels._files_panel import FilesPanel
 from fba_player._ui.panels._help_panel import HelpPanel
-from fba_player._ui.panels._page_panels import MarkersPanel, PointsPanel
+from fba_player._ui.panels._page_panels import MarkersPanel, PhotosPanel, PointsPanel
 from fba_player._ui.panels._rate_panel import RatePanel
 from fba_player._ui.panels._view_panel import CameraPanel, ViewPanel
 from fba_player._ui.panels.panel import Panel
@@ -19,7 +19,9 @@ PANELS: tuple[type[Panel], ...] = (
 )  # fmt: skip
 
 
-PAGES: dict[str, tuple[type[Panel], ...]] = {"points": (PointsPanel,), "markers": (MarkersPanel, CameraPanel)}
+PAGES: dict[str, tuple[type[Panel], ...]] = {
+    "points": (PointsPanel,), "markers": (MarkersPanel, CameraPanel), "photos": (PhotosPanel,),
+}  # fmt: skip
 """Panels of windows for one task, by the name of the page's own panel."""
 
 
