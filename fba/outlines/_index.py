@@ -86,7 +86,7 @@ class Index:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Index:
-        """Read an index. Raises FormatError for a file that is none, is damaged, or contradicts itself."""
+        """Read an index. Raises FormatError for another kind of file, a damaged or a contradictory one."""
         return cls(read_index(path))
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -197,7 +197,7 @@ def build_index(
     listed = [(name, animation, range(0, len(animation), choice.every)) for name, animation in performances]
     total = sum(len(frames) for _, _, frames in listed) * choice.views * len(choice.pitches)
     if not total:
-        raise FbaError("an index needs at least one frame, and there is none")
+        raise FbaError("an index needs at least one frame; the files have 0")
     if total > MOST_SILHOUETTES:
         raise LimitError(
             f"{total} silhouettes are more than the {MOST_SILHOUETTES} that an index holds; "

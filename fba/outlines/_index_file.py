@@ -108,7 +108,7 @@ def write_index(path: str | os.PathLike[str], stored: Stored) -> None:
 
 
 def read_index(path: str | os.PathLike[str]) -> Stored:
-    """Return an index. Raises FormatError for a file that is none, is damaged, or contradicts itself."""
+    """Return an index. Raises FormatError for another kind of file, a damaged or a contradictory one."""
     file, _ = open_source(path)
     with file:
         try:

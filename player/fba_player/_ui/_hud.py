@@ -56,7 +56,7 @@ def _draw_recording(session: Session) -> float:
 
 
 def live_message(session: Session) -> str:
-    """Return what a live stream says of itself, such as that a part was lost; "" where there is none."""
+    """Return what a live stream says of itself, such as that a part was lost, else ""."""
     scene = session.scene
     animation: object = scene.animation if isinstance(scene, Scene) else None
     return animation.message if isinstance(animation, LiveAnimation) else ""

@@ -162,7 +162,7 @@ def write(scene: Any, path: str, options: ExportOptions, progress: Any = None) -
 def part(animation: Animation, start: float | None, end: float | None) -> Animation:
     """Return the frames between two times, seconds; the first also sends what was in force before it.
 
-    Raises ValueError if there are none.
+    Raises ValueError where no frame lies between them.
     """
     low, high = -math.inf if start is None else start, math.inf if end is None else end
     cut = animation.between(low, high)
