@@ -51,6 +51,11 @@ def test_a_source_reads_them_in_the_background() -> None:
     assert source.expressions == ()
     source.probe(wait=True)
     assert [one.label for one in source.expressions] == ["neutral", "anger", "neutral"]
+    felt = source.lanes[-1]
+    assert (felt.name, felt.labels, felt.estimated) == ("felt", ("anger",), True)
+    assert felt.text(4.0 - 1.0) == str(source.expressions[1])
+    assert source.activity is not None
+    assert "brows" in source.activity.names
 
 
 def test_every_label_has_a_colour() -> None:
@@ -59,4 +64,4 @@ def test_every_label_has_a_colour() -> None:
     graphics.imported("imgui_bundle")
     from fba_player._ui import theme
 
-    assert set(theme.FEELINGS) == set(labels()) - {"neutral", "unknown"}
+    assert set(theme.HUES) == set(labels()) - {"neutral", "unknown"}
