@@ -151,7 +151,7 @@ def _play(
         ]
 
         def build() -> Showable:
-            scene = scenes.build_scene(animations, names, how, over=compare)
+            scene: Showable = scenes.build_scene(animations, names, how, over=compare)
             _check_start(scene, start, growing=bool(streams))
             return scene
 

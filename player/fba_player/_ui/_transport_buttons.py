@@ -89,6 +89,7 @@ class Buttons:
             ("interpolate", icons.smooth, "smooth between frames", False)
             if transport.interpolate
             else ("interpolate", icons.stepped, "frame by frame", False),
+            ("lanes", icons.lanes, "lanes: what is said, felt and heard; all; none", False),
         ]
         if session.audio is not None:
             quiet = session.audio.muted

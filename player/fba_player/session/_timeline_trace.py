@@ -158,11 +158,6 @@ def lane_of_stretches(stretches: tuple[Stretch, ...]) -> Lane | None:
     )
 
 
-def stretch_at(stretches: tuple[Stretch, ...], time: float) -> Stretch | None:
-    """Return the stretch at a time in seconds; None without one."""
-    return next((stretch for stretch in stretches if stretch.start <= time < stretch.end), None)
-
-
 def _stretches(readings: Readings, begin: float, step: float) -> tuple[Stretch, ...]:
     stretches = []
     pairs = zip(readings.times.tolist(), readings.readings, strict=True)

@@ -125,6 +125,7 @@ class Surface:
         ):
             glfw.window_hint(hint, value)
         self.window = glfw.create_window(*self.size, title, None, None)
+        glfw.default_window_hints()
         if not self.window:
             missing = missing_libraries()
             if missing:
