@@ -30,7 +30,6 @@ from fba_player.window._window import WARNING_SECONDS, Window
 from fba_player.window.surface import Resumed, Surface
 
 if TYPE_CHECKING:
-    from fba_player.sound._player import Audio
     from fba_player.view.protocols import Showable
 
 Newest = Callable[[], tuple[FaceTrack | None, BodyTrack | None]]
@@ -104,23 +103,9 @@ def play(
         session.read = surface.read or session.read
         window.transport.set_speed(speed)
         window.transport.interpolate = interpolate
-        session.open |= set(panels)
-        if newest is not None:
-            follow_newest(session, newest)
-        for text in warnings:
-            session.say(text, "warning", WARNING_SECONDS)
-        if memory is not None and file is not None:
-            memory.add(file)
-        if life and isinstance(scene, Scene):
-            session.life = Life(scene.animation)
-        if from_face:
-            session.viewpoint.begin_with_face()
+        _set_up(session, panels, warnings, newest, life=life, from_face=from_face)
         if audio is not None:
-            sound = _add_sound(session, audio, audio_offset)
-            if sound is not None:
-                stack.enter_context(sound)
-            session.peaks = stack.enter_context(Peaks(audio))
-            session.peaks.start()
+            _add_sound(stack, session, audio, audio_offset)
         if start is not None:
             window.transport.seek(start)
         if resumed is not None:
@@ -130,6 +115,29 @@ def play(
         window.run()
         surface.resumed = _state(session) if session.resumes else None
         return session.dropped
+
+
+def _set_up(
+    session: Session,
+    panels: tuple[str, ...],
+    warnings: tuple[str, ...],
+    newest: Newest | None,
+    *,
+    life: bool,
+    from_face: bool,
+) -> None:
+    """Set what a session begins with, see `play`."""
+    session.open |= set(panels)
+    for text in warnings:
+        session.say(text, "warning", WARNING_SECONDS)
+    if newest is not None:
+        follow_newest(session, newest)
+    if session.memory is not None and session.source.path is not None:
+        session.memory.add(session.source.path)
+    if life and isinstance(session.scene, Scene):
+        session.life = Life(session.scene.animation)
+    if from_face:
+        session.viewpoint.begin_with_face()
 
 
 def _scene_of(animation: Animation | LiveAnimation | Showable) -> Showable:
@@ -169,17 +177,20 @@ def _resume(session: Session, state: Resumed) -> None:
     session.say(f"{session.source.name} has changed on disk, and is shown again", about="reload")
 
 
-def _add_sound(session: Session, path: PathLike, offset: float) -> Audio | None:
-    """Add a sound to the session; return None, with a notice, if there is no sound device."""
+def _add_sound(stack: contextlib.ExitStack, session: Session, path: PathLike, offset: float) -> None:
+    """Add a sound and its outline to the session, until the stack is closed."""
     from fba_player.sound._player import open_audio
 
     session.audio = open_audio(path, session.transport, offset=offset)
     session.sound, session.sound_offset = path, offset
-    if session.audio is None:
+    if session.audio is not None:
+        stack.enter_context(session.audio)
+    else:
         name = os.path.basename(os.fspath(path))
         text = f"There is no sound device: {name} is not heard, but recorded films have it"
         session.say(text, "warning", 8.0)
-    return session.audio
+    session.peaks = stack.enter_context(Peaks(path))
+    session.peaks.start()
 
 
 def follow_newest(session: Session, newest: Newest) -> None:
