@@ -9,11 +9,8 @@ export class FbaError extends Error {
    * @param {number} [bit] from the start of the stream
    * @param {string} [remedy]
    */
-  constructor(kind, finding, plane, bit, remedy = kind === "damage" ? "the option salvage reads on behind it" : "") {
-    const where = [];
-    if (plane !== undefined) where.push(`plane ${plane}`);
-    if (bit !== undefined) where.push(`bit ${bit} (byte ${Math.floor(bit / 8)})`);
-    super((where.length ? `${where.join(", ")}: ` : "") + finding + (remedy && `; ${remedy}`));
+  constructor(kind, finding, plane, bit, remedy = kind === "damage" ? "the option salvage reads on" : "") {
+    super((plane === undefined ? "" : `plane ${plane}, bit ${bit ?? 0}: `) + finding + (remedy && `; ${remedy}`));
     this.name = "FbaError";
     this.kind = kind;
     this.finding = finding;

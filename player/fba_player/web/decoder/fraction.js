@@ -12,43 +12,31 @@ export class Fraction {
     if (this.denominator > MOST) [this.numerator, this.denominator] = [(FINE * above) / below, FINE];
   }
 
-  /** @param {Fraction} other */
-  plus(other) {
-    const numerator = this.numerator * other.denominator + other.numerator * this.denominator;
-    return new Fraction(numerator, this.denominator * other.denominator);
-  }
-
-  /** @param {Fraction} other */
-  times(other) {
-    return new Fraction(this.numerator * other.numerator, this.denominator * other.denominator);
-  }
-
-  /** @param {Fraction} other above 0 */
-  over(other) {
-    return new Fraction(this.numerator * other.denominator, this.denominator * other.numerator);
-  }
-
-  /** Return a number below, at or above 0, as this is less than, equal to or more than the other. @param {Fraction} other */
-  compare(other) {
-    return Number(this.numerator * other.denominator - other.numerator * this.denominator);
-  }
-
-  /** Return the whole number below, or with 1 / 2 the nearest one. @param {bigint} [up] numerator of what is added */
-  floor(up = 0n) {
-    return Number((2n * this.numerator + up * this.denominator) / (2n * this.denominator));
-  }
-
   valueOf() {
     return Number(this.numerator) / Number(this.denominator);
   }
 
   toString() {
-    return this.denominator === 1n ? `${this.numerator}` : `${this.numerator}/${this.denominator}`;
+    return this.numerator + (this.denominator > 1n ? `/${this.denominator}` : "");
   }
 }
 
-/** @param {bigint} a @param {bigint} b */
-export function greatestDivisor(a, b) {
-  while (b) [a, b] = [b, a % b];
-  return a;
-}
+/** @param {Fraction} one @param {Fraction} other */
+export const sum = (one, other) =>
+  new Fraction(one.numerator * other.denominator + other.numerator * one.denominator, one.denominator * other.denominator);
+
+/** @param {Fraction} one @param {Fraction} other */
+export const product = (one, other) =>
+  new Fraction(one.numerator * other.numerator, one.denominator * other.denominator);
+
+/** Return 1 / a fraction above 0. @param {Fraction} fraction */
+export const inverse = ({ numerator, denominator }) => new Fraction(denominator, numerator);
+
+/** Return a number below, at or above 0, as one is less than, equal to or more than the other. @param {Fraction} one @param {Fraction} other */
+export const compare = (one, other) => Number(one.numerator * other.denominator - other.numerator * one.denominator);
+
+/** Return the nearest whole number; halves are rounded up. @param {Fraction} fraction */
+export const nearest = ({ numerator, denominator }) => Number((2n * numerator + denominator) / (2n * denominator));
+
+/** @param {bigint} one @param {bigint} other @returns {bigint} */
+export const greatestDivisor = (one, other) => (other ? greatestDivisor(other, one % other) : one);
