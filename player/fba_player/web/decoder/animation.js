@@ -1,6 +1,7 @@
 /** Whole streams. */
 import { commonTimes } from "./clock.js";
 import { FbaError } from "./errors.js";
+import { text, value } from "./fraction.js";
 import { partsOf } from "./frames.js";
 import { Decoder, NO_END, bytesOf } from "./stream.js";
 
@@ -15,13 +16,14 @@ import { Decoder, NO_END, bytesOf } from "./stream.js";
 export function decode(data, options = {}) {
   const decoder = new Decoder(options, bytesOf(data));
   const { damage, warnings, mark } = decoder;
-  const { _planes: planes, _wrong: wrong, _open: open } = /** @type {import("./stream.js").Whole} */ (decoder._whole);
+  const [planes, wrong, open] = /** @type {import("./stream.js").Whole} */ (decoder._whole);
   if (!planes.length) throw new FbaError("damage", "no plane can be decoded", 0, undefined, damage[0]?.error.message);
   if (!options.salvage && open) warnings.push(`plane ${planes.length - 1}: ${NO_END}`);
-  const { rate, index } = commonTimes(planes);
+  const [rate, index] = commonTimes(planes);
+  const [numerator, denominator] = rate;
   const kept = keptPlanes(index, wrong);
   const indices = Float64Array.from(kept, (at) => index[at]);
-  const time = (/** @type {number} */ at) => (indices[at] * Number(rate.denominator)) / Number(rate.numerator);
+  const time = (/** @type {number} */ at) => (indices[at] * Number(denominator)) / Number(numerator);
   return {
     /** What was lost, when salvaging. */
     damage,
@@ -30,11 +32,11 @@ export function decode(data, options = {}) {
     /** The table of BAP steps that the stream's mark names, or null. */
     mark,
     /** Frames per second, an exact fraction. */
-    rate,
+    rate: { numerator, denominator, valueOf: () => value(rate), toString: () => text(rate) },
     /** Number of each frame at `rate`, rising: frames that are skipped have none. */
     index: indices,
-    hasFace: planes.some((plane) => plane.face),
-    hasBody: planes.some((plane) => plane.body),
+    hasFace: planes.some((plane) => plane._face),
+    hasBody: planes.some((plane) => plane._body),
     /** Number of frames. */
     length: kept.length,
     /** Return the seconds at which a frame is shown. */

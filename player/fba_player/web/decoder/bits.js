@@ -2,17 +2,16 @@
 
 export const OUT_OF_DATA = 0; // thrown where the data end inside an element; never reaches a caller of the decoder
 
-const OBJECT_CODES = [0xba, 0x01]; // the standard's, and that of old tools
-const PLANE_CODES = [0xbb, 0x03];
 export const SEQUENCE = 0xb0; // start of a visual object sequence
 export const END = 0xb1;
 export const USER_DATA = 0xb2;
 export const OBJECT_ENDS = [END, SEQUENCE, 0xb5]; // headers of other layers, too, end an object
 
+// The start codes of an object and of a plane: the standard's, and those of old tools.
 /** @param {number} code */
-export const isObject = (code) => OBJECT_CODES.includes(code);
+export const isObject = (code) => code === 0xba || code === 1;
 /** @param {number} code */
-export const isPlane = (code) => PLANE_CODES.includes(code);
+export const isPlane = (code) => code === 0xbb || code === 3;
 
 /**
  * data: from the byte `first` of a stream up to the last that came. bit: the next one to read, in the stream.

@@ -1,5 +1,7 @@
 /** Times of planes from frame rate, skips and time codes, as exact fractions; behind damage the most likely ones. */
-import { Fraction, compare, greatestDivisor, inverse, nearest, product, sum } from "./fraction.js";
+import { compare, fraction, greatestDivisor, inverse, nearest, product, sum, text, value } from "./fraction.js";
+
+/** @typedef {import("./fraction.js").Fraction} Fraction */
 
 const BELIEVED_JUMP = 60; // seconds that a time code may jump ahead without other damage
 const REPEATED_RATES = 2; // I planes with the same rate behind which another rate in one of them is damage
@@ -13,7 +15,7 @@ const COMMON_RATE_MAX = 1e6; // highest rate that is chosen to make all times ex
 
 /** Return the seconds at which a frame is shown. @param {Span} span @param {number} index */
 export const timeIn = ({ _rate, _anchor, _anchorIndex }, index) =>
-  sum(_anchor, product(new Fraction(index - _anchorIndex), inverse(_rate)));
+  sum(_anchor, product(fraction(index - _anchorIndex), inverse(_rate)));
 
 /** @param {Fraction} one @param {Fraction | null | undefined} other */
 const equal = (one, other) => other != null && !compare(one, other);
@@ -99,7 +101,7 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
      * @param {boolean} behindLoss whether it is the first plane behind damage
      * @param {number[] | null} lost about how many frames were lost before it, and the uncertainty, where known
      */
-    _beginIntra({ rate: stated, timeCode: code }, startCode, behindLoss, lost) {
+    _beginIntra({ _rate: stated, _timeCode: code }, startCode, behindLoss, lost) {
       if (lost && !code?._marker) {
         const distance = (/** @type {number} */ point) => Math.abs(point - index - lost[0]);
         const expected = upcoming(index + lost[0]).reduce((best, point) => (distance(point) >= distance(best) ? best : point), NaN);
@@ -109,29 +111,29 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
         index += Math.max(lost[0] - (agreements && !regular ? lost[1] : 0), 0);
       }
       const [agreed, before] = [agreements, span?._rate];
-      const now = span ? timeIn(span, index) : new Fraction(0);
+      const now = span ? timeIn(span, index) : fraction(0);
       let refused = "";
       if (!stated && !before) warn("no frame rate, 25 assumed");
-      let rate = stated ?? before ?? new Fraction(25);
+      let rate = stated ?? before ?? fraction(25);
       if (salvage && stated && doubtsRate(rate, before) && before) {
-        refused = `frame rate ${rate} not used`;
+        refused = `frame rate ${text(rate)} not used`;
         rate = before;
       }
       const sameRate = equal(rate, before);
       if (!sameRate) {
-        if (before) warn(`frame rate ${rate}, before ${before}`);
-        const { numerator, denominator } = product(now, rate);
-        index = Number((numerator + denominator - 1n) / denominator);
+        if (before) warn(`frame rate ${text(rate)}, before ${text(before)}`);
+        const [above, below] = product(now, rate);
+        index = Number((above + below - 1n) / below);
         span = { _rate: rate, _anchor: now, _anchorIndex: index };
       }
       /** Frames by which the time code exceeds the count of planes. @type {number | null} */
       let jump = null;
-      const text = `time code ${code?._seconds} s`;
+      const named = `time code ${code?._seconds} s`;
       if (code) {
-        const seconds = new Fraction(code._seconds);
+        const seconds = fraction(code._seconds);
         const ahead = compare(seconds, now) >= 0;
         let frame = nearest(product(seconds, rate));
-        const notUsed = `${text} not used`;
+        const notUsed = `${named} not used`;
         if (code._marker && before && frame === index) {
           jump = 0;
           agreements += 1;
@@ -140,7 +142,7 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
           (!ahead && !(salvage && (isConfirmed(frame) || frame > codedIndex || (lastJump > 0 && frame === index - lastJump))))
         ) {
           warn(notUsed);
-        } else if (salvage && !isConfirmed(frame) && agreements && frame - index > BELIEVED_JUMP * rate.valueOf()) {
+        } else if (salvage && !isConfirmed(frame) && agreements && frame - index > BELIEVED_JUMP * value(rate)) {
           refused = notUsed;
         } else {
           if (ahead) frame = Math.max(frame, index);
@@ -163,7 +165,7 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
       const gained = Math.max(moved, 0);
       if (behindLoss) resume(jump === null ? lost : [gained, 0]);
       else if (salvage && (moved < 0 || (agreed && moved))) {
-        report(`${text}: ${Math.abs(moved)} frames ${moved > 0 ? "missing" : "too many"}`, gained);
+        report(`${named}: ${Math.abs(moved)} frames ${moved > 0 ? "missing" : "too many"}`, gained);
       }
       if (refused) report(refused, null);
     },
@@ -174,7 +176,7 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
       const now = catchingUp ? following : index;
       index += skip + 1;
       following = now + 1;
-      return { index: now, span: /** @type {Span} */ (span) };
+      return /** @type {[number, Span]} */ ([now, span]);
     },
   };
 }
@@ -182,46 +184,46 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
 /**
  * Return one rate and the indices of planes at it, for a stream that may change its rate and set its clock: the lowest
  * rate at which all planes have whole indices, or else the highest of the stream's.
- * @param {{index: number, span: Span}[]} planes
+ * @param {{_span: Span, _shown: {index: number}}[]} planes
  */
 export function commonTimes(planes) {
-  /** @type {{first: number, index: number, start: Fraction, span: Span}[]} */
+  /** @type {{_first: number, _index: number, _start: Fraction, _span: Span}[]} */
   const runs = [];
-  let highest = planes[0].span._rate;
+  let highest = planes[0]._span._rate;
   /** @type {Fraction | null} */
   let exact = highest;
-  planes.forEach(({ index, span }, first) => {
-    const last = runs[runs.length - 1]?.span;
+  planes.forEach(({ _span: span, _shown: { index } }, first) => {
+    const last = runs[runs.length - 1]?._span;
     if (last === span) return;
     const start = timeIn(span, index);
     const rate = span._rate;
     if (last && equal(rate, last._rate) && equal(start, timeIn(last, index))) return;
-    runs.push({ first, index, start, span });
+    runs.push({ _first: first, _index: index, _start: start, _span: span });
     if (compare(rate, highest) > 0) highest = rate;
-    for (const { numerator, denominator } of start.numerator ? [rate, inverse(start)] : [rate]) {
+    for (const [above, below] of start[0] ? [rate, inverse(start)] : [rate]) {
       if (!exact) return;
-      const multiple = (exact.numerator / greatestDivisor(exact.numerator, numerator)) * numerator;
-      exact = new Fraction(multiple, greatestDivisor(exact.denominator, denominator));
-      if (exact.valueOf() > COMMON_RATE_MAX) exact = null;
+      const [multiple, divisor] = exact;
+      exact = fraction((multiple / greatestDivisor(multiple, above)) * above, greatestDivisor(divisor, below));
+      if (value(exact) > COMMON_RATE_MAX) exact = null;
     }
   });
-  const same = runs.every(({ span }) => equal(span._rate, highest));
+  const same = runs.every(({ _span: span }) => equal(span._rate, highest));
   const rate = (!same && exact) || highest;
   let run = runs[0];
-  let offset = new Fraction(0);
+  let offset = fraction(0);
   let late = 0;
   let following = 0;
-  const index = Float64Array.from(planes, (plane, at) => {
-    if (same) return plane.index;
-    if (at === runs[0]?.first) {
+  const indices = Float64Array.from(planes, ({ _shown: { index } }, at) => {
+    if (same) return index;
+    if (at === runs[0]?._first) {
       run = runs[0];
       runs.shift();
-      offset = product(run.start, rate);
+      offset = product(run._start, rate);
       late = Math.max(following - nearest(offset), 0);
     }
-    const count = product(product(rate, inverse(run.span._rate)), new Fraction(plane.index - run.index));
+    const count = product(product(rate, inverse(run._span._rate)), fraction(index - run._index));
     following = nearest(sum(offset, count)) + late + 1;
     return following - 1;
   });
-  return { rate, index };
+  return /** @type {const} */ ([rate, indices]);
 }

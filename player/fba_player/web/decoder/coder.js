@@ -12,17 +12,15 @@ const THREE_QUARTERS = 49152;
 const TOTAL_MAX = 16383;
 const GUARD = 22; // zero bits in a row after which a 1 is inserted
 
-const UNUSED = new Uint16Array(4096); // counts before the first symbol, more than any alphabet has
+export const UNUSED = new Uint16Array(4096); // counts before the first symbol, more than any alphabet has
 
 /**
- * Model of the symbols of a slot: sizes of the alphabets in I planes and in P planes. Of P planes: total: sum of all
- * counts; added: what was added to each; tree: a Fenwick tree over that.
- * @typedef {{_intraSize: number, _size: number, _total: number, _added: Uint16Array, _tree: Uint16Array}} Model
+ * What is known of a slot since the last I plane: sizes of the alphabets in I planes and in P planes, the smallest levels,
+ * the quantiser step. Of the coder in P planes: total: sum of all counts; added: what was added to each; tree: a Fenwick
+ * tree over that. symbol, value: of the plane that is being read. last: value of the plane before it.
+ * @typedef {{_intraSize: number, _size: number, _intraMin: number, _min: number, _step: number, _total: number,
+ *   _added: Uint16Array, _tree: Uint16Array, _symbol: number, _value: number, _last: number}} Model
  */
-
-/** Return a model with all counts at 1. @param {number} intraSize @param {number} size @returns {Model} */
-export const newModel = (intraSize, size) =>
-  ({ _intraSize: intraSize, _size: size, _total: size, _added: UNUSED, _tree: UNUSED });
 
 /** Raise the count of a symbol. @param {Model} model @param {number} symbol */
 export function learn(model, symbol, amount = 1) {
@@ -39,17 +37,14 @@ export function learn(model, symbol, amount = 1) {
 }
 
 /**
- * Decode a segment. Models do not change.
+ * Decode a segment. Counts do not change.
  * @param {import("./bits.js").Input} input
  * @param {(finding: string, bit: number) => never} fail
- * @param {Model[]} models of all slots
- * @param {Int32Array} slots those of the segment are from `first` to `stop`
- * @param {number} first
- * @param {number} stop
+ * @param {Model[]} models of all slots: the symbols are left in them
+ * @param {number[]} slots
  * @param {boolean} intra whether it is of an I plane
- * @param {Int32Array} symbols of all slots, filled for those of the segment
  */
-export function decodeSegment(input, fail, models, slots, first, stop, intra, symbols) {
+export function decodeSegment(input, fail, models, slots, intra) {
   const data = input._data;
   const origin = 8 * input._first;
   let bit = input._bit - origin;
@@ -61,7 +56,7 @@ export function decodeSegment(input, fail, models, slots, first, stop, intra, sy
   let guardAt = -1; // `taken` at the last inserted bit
   let badGuard = NaN;
   let badGuardAt = Infinity;
-  for (; ; first += 1) {
+  for (let place = 0; ; place += 1) {
     for (;;) {
       if (high >= HALF) {
         const less = low >= HALF ? HALF : low >= QUARTER && high < THREE_QUARTERS ? QUARTER : 0;
@@ -87,9 +82,8 @@ export function decodeSegment(input, fail, models, slots, first, stop, intra, sy
       code = (code << 1) | value;
       taken += 1;
     }
-    if (first === stop) break;
-    const slot = slots[first];
-    const model = models[slot];
+    if (place === slots.length) break;
+    const model = models[slots[place]];
     const span = high - low + 1;
     const total = intra ? model._intraSize : model._total;
     const target = total - 1 - ((((code - low + 1) * total - 1) / span) | 0); // counted from symbol 0 upwards
@@ -99,7 +93,7 @@ export function decodeSegment(input, fail, models, slots, first, stop, intra, sy
     if (!intra) {
       const tree = model._tree;
       symbol = 0;
-      for (let step = 2048; step; step >>= 1) {
+      for (let step = 1 << (31 - Math.clz32(model._size)); step; step >>= 1) {
         if (symbol + step > model._size) continue;
         const weight = step + tree[symbol + step];
         if (weight > below) continue;
@@ -109,18 +103,18 @@ export function decodeSegment(input, fail, models, slots, first, stop, intra, sy
       below = target - below;
       share += model._added[symbol];
     }
-    symbols[slot] = symbol;
+    model._symbol = symbol;
     high = low - 1 + (((span * (total - below)) / total) | 0);
     low += ((span * (total - below - share)) / total) | 0;
   }
   // Of the 16 bits in the register, the first two close the segment; the other 14 follow it, and so does a 1 among
   // them that was counted as inserted.
   taken -= 14;
-  if (badGuardAt < taken) fail("no 1 behind 22 zero bits", badGuard + origin);
+  if (badGuardAt < taken) fail("22 zero bits without a 1", badGuard + origin);
   const after = bit - 14 - Number(guardAt >= taken);
   const closed = code >> 14 === (low < QUARTER ? 1 : 2);
   const end = 8 * data.length;
   if (after > end || (!closed && bit > end)) throw OUT_OF_DATA; // with bits missing, it need not be damage
-  if (!closed) fail("a segment's end without its closing bits", after - 2 + origin);
+  if (!closed) fail("segment without an end", after - 2 + origin);
   input._bit = after + origin;
 }

@@ -1,6 +1,7 @@
 /** What users get of a plane. */
-import { FIRST_BAP, FIRST_FAP, FLAGS, FLAG_SLOTS, SLOTS } from "./parameters.js";
+import { FIRST_BAP, FIRST_FAP, FLAGS, SLOTS } from "./parameters.js";
 import { timeIn } from "./clock.js";
+import { value } from "./fraction.js";
 
 /**
  * The FAPs of a frame. values: FAPs 3 to 68 at 2 to 67, in the standard's units. mask: which of the 68 are sent.
@@ -20,12 +21,12 @@ import { timeIn } from "./clock.js";
  */
 
 /** Return the face and the body of a plane. @param {import("./planes.js").Plane} plane */
-export function partsOf({ face, body, row }) {
+export function partsOf({ _face: face, _body: body, _row: row }) {
   const values = new Int32Array(body ? SLOTS : FIRST_BAP);
   let at = 0;
-  for (const slots of [face?._slots, body?._slots, FLAG_SLOTS]) for (const slot of slots ?? []) values[slot] = row[at++];
+  for (const part of [face, body]) for (const slot of part?._slots ?? []) values[slot] = row[at++];
   const [select1, select2, blend, ...expression] = values.subarray(0, FIRST_FAP);
-  const [visemeDef, ...expressionFlags] = values.subarray(FLAGS, FIRST_BAP);
+  const [visemeDef, ...expressionFlags] = row.subarray(at);
   return {
     face: face && {
       values: values.subarray(FIRST_FAP - 2, FLAGS).fill(0, 0, 2),
@@ -40,13 +41,8 @@ export function partsOf({ face, body, row }) {
 
 /** @param {import("./stream.js").StreamPlane} plane @returns {StreamFrame} */
 export const streamFrame = (plane) => ({
-  index: plane.index,
-  time: timeIn(plane.span, plane.index).valueOf(),
+  ...plane._shown,
+  time: value(timeIn(plane._span, plane._shown.index)),
+  rate: value(plane._span._rate),
   ...partsOf(plane),
-  plane: plane.number,
-  bit: plane.bit,
-  bits: plane.stop - plane.bit,
-  intra: plane.intra,
-  doubtful: plane.doubtful,
-  rate: plane.span._rate.valueOf(),
 });

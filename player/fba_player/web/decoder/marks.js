@@ -14,47 +14,44 @@ const MOST_MARK_BYTES = 64; // within which the words of a mark are complete
 export const isTable = (name) => Object.hasOwn(STEP_PLACES, name);
 
 /**
- * Read the words of a mark. table: null where they name none that exists. end: byte behind them. count: of checks, NaN
- * without them.
+ * Read the words of a mark: the table, null where they name none that exists; the byte behind them; the number of checks,
+ * NaN without them; the name of the table; all text.
  * @param {Uint8Array} content behind the start code
+ * @returns {[BapSteps | null, number, number, string, string]}
  */
 function readWords(content) {
   const text = String.fromCharCode(...content.subarray(0, MOST_MARK_BYTES));
   const [words, steps, named = "", , checks, count = ""] = WORDS.exec(text) ?? [""];
-  return {
-    text,
-    named,
-    table: isTable(named) ? named : null,
-    end: steps || checks ? words.length : 0,
-    count: /^\d{1,9}$/.test(count) ? Number(count) : NaN,
-  };
+  const end = steps || checks ? words.length : 0;
+  return [isTable(named) ? named : null, end, /^\d{1,9}$/.test(count) ? +count : NaN, named, text];
 }
 
 /** Return how many bytes behind its start code a mark needs. @param {Uint8Array} content its beginning @param {number} most I periods */
 export function bytesNeeded(content, most) {
-  const { end, count } = readWords(content);
+  const [, end, count] = readWords(content);
   return count <= most ? end + 4 * count + 4 : count > most ? end : MOST_MARK_BYTES;
 }
 
+/** Say that a mark names a table of BAP steps in place of another. @param {string} named @param {string} other */
+export const otherSteps = (named, other) => `mark: BAP steps ${named}, not ${other}`;
+
 /**
- * Return the mark in user data; null where they are none. checks: null without any that can be relied on.
+ * Return the mark in user data; null where they are none: the table, and the checks, null without any that can be relied on.
  * @param {Uint8Array} content behind the start code
- * @returns {{table: BapSteps | null, checks: string[] | null, problems: string[]} | null}
+ * @param {string[]} warnings
+ * @returns {[BapSteps | null, string[] | null] | null}
  */
-export function readMark(content) {
-  const { text, named, table, end, count } = readWords(content);
+export function readMark(content, warnings) {
+  const [table, end, count, named, text] = readWords(content);
   const head = text.split("\0\0\x01")[0];
   if (!"fba ".startsWith(head.slice(0, 4)) && !/fba |bap_steps=|crc32=/.test(head)) return null;
-  const problems = [];
   let checks = null;
-  if (named && !table) problems.push(`unknown BAP steps ${named} in the mark`);
-  if (count >= 0) {
-    const check = (/** @type {number} */ place) => content.subarray(end + 4 * place, end + 4 * place + 4).join();
-    if (check(count) === writtenCheck(crc32(content.subarray(0, end + 4 * count)))) {
-      checks = Array.from({ length: count }, (_, place) => check(place));
-    } else problems.push("checks of the mark not used: damaged");
-  } else if (!end || end < head.length) problems.push("mark damaged");
-  return { table, checks, problems };
+  if (named && !table) warnings.push(otherSteps(named, "iso or visage"));
+  const check = (/** @type {number} */ place) => content.subarray(end + 4 * place, end + 4 * place + 4).join();
+  if (count >= 0 && check(count) === writtenCheck(crc32(content.subarray(0, end + 4 * count)))) {
+    checks = Array.from({ length: count }, (_, place) => check(place));
+  } else if (count >= 0 || !end || end < head.length) warnings.push("mark: damaged");
+  return [table, checks];
 }
 
 /**
@@ -69,7 +66,7 @@ export function findMarks(data) {
     const code = data[at + 3];
     if (isObject(code)) begin = at;
     if (code === END && codeAt(data, at + 4) === USER_DATA) {
-      const { table, end } = readWords(data.subarray(at + 8));
+      const [table, end] = readWords(data.subarray(at + 8));
       if (table) marks.push([table, begin, (begin = at + 8 + end)]);
     }
   }

@@ -13,13 +13,10 @@ export const BODY = 2;
 export const SLOTS = 372;
 export const FIRST_FAP = 7;
 export const FLAGS = 73;
-export const FLAG_SLOTS = Int32Array.of(73, 74, 75);
 export const FIRST_BAP = 76;
 export const RANGE_UNIT = 60;
-const BAP_SCALES = [
-  0, 1, 2, 3, 5, 7, 9, 11, 14, 17, 20, 23, 27, 31, 35, 39, 43, 47, 52, 57, 62, 67, 72, 77, 82, 88, 94, 100, 106, 113,
-  120, 127,
-];
+let scale = 0;
+const BAP_SCALES = [..."01112222333344444455555556666777"].map((more) => (scale += Number(more))); // 0 to 127
 
 /** Of the face at FACE, of the body at BODY: columns of each group, from 0 in coding order; slot of column 0. @type {[number[][], number][]} */
 export const PARTS = [[[], 0], [groups(FAP_GROUPS), FIRST_FAP - 2], [groups(BAP_GROUPS), FIRST_BAP]];
@@ -45,13 +42,11 @@ export const amountLimit = (slot, quant) =>
   lowest(slot) ? Math.floor((63 + (quant >> 1)) / (quant || 1)) : HIGHEST[slot];
 
 /** Return the quantiser step of a slot; selects have none. @param {number} slot @param {BapSteps} table @param {number} scale 0 without a quantiser */
-export const stepOf = (slot, table, scale) => (STEPS[Number(STEP_PLACES[table][slot])] ?? 1) * scale || 1;
+export const stepOf = (slot, table, scale) => (STEPS[+STEP_PLACES[table][slot]] ?? 1) * scale || 1;
 
-/** Default ranges as magnitudes, of all slots I max, I min, P max, P min; NaN for extension BAPs, which have none. */
-export const DEFAULT_LIMITS = LIMITS.map((list) =>
-  Float32Array.from({ length: SLOTS }, (_, slot) => RANGE_UNIT * parseInt(list[slot] ?? "", 36)),
-);
+/** Default ranges as magnitudes, of all slots I max, I min, P max, P min; extension BAPs have none. */
+export const DEFAULT_LIMITS = LIMITS.map((list) => [...list].map((digit) => RANGE_UNIT * parseInt(digit, 36)));
 
 /** Return the name of a slot's parameter. @param {number} slot */
 export const label = (slot) =>
-  slot < FLAGS ? `FAP ${slot < FIRST_FAP ? 1 + Number(slot > 2) : slot - 4}` : `BAP ${slot - 75}`;
+  slot < FLAGS ? `FAP ${slot < FIRST_FAP ? 1 + +(slot > 2) : slot - 4}` : `BAP ${slot - 75}`;

@@ -1,20 +1,22 @@
 /** Reads the planes of an object (ISO/IEC 14496-2, FBA object plane), and keeps the state between them. */
 import { read } from "./bits.js";
-import { decodeSegment, learn, newModel } from "./coder.js";
-import { Fraction } from "./fraction.js";
+import { UNUSED, decodeSegment, learn } from "./coder.js";
+import { fraction } from "./fraction.js";
 import {
-  BODY, FACE, FIRST_BAP, FIRST_FAP, FLAGS, FLAG_SLOTS, HIGHEST, PARTS, RANGE_UNIT, SLOTS, DEFAULT_LIMITS, amountLimit, label,
+  BODY, FACE, FIRST_FAP, HIGHEST, PARTS, RANGE_UNIT, DEFAULT_LIMITS, amountLimit, label,
   lowest, scaleOf, stepOf,
 } from "./parameters.js";
 
 const SKIP_MAX = 15 << 20; // a week at 25 frames/s; more is damage
 const MARKER_EVERY = 4;
+/** Segments of FAP 1 and 2. @type {[number[], number][]} */
+const VISEME_AND_EXPRESSION = [[[0, 1, 2], 1], [[3, 4, 5, 6], 2]];
 
 /**
  * What an I plane's header says of a part, in force until the next I plane with this part. mask: which parameters are
  * sent. interpolated: which others are to be interpolated. slots: those that are sent, in coding order. segments: of the
- * arithmetic coder, as [first, behind the last] of these slots, and bits that follow.
- * @typedef {{mask: Uint8Array, interpolated: Uint8Array, _slots: Int32Array, _segments: [number, number, number][]}} Part
+ * arithmetic coder, their slots and how many flags follow.
+ * @typedef {{mask: Uint8Array, interpolated: Uint8Array, _slots: number[], _segments: [number[], number][]}} Part
  *
  * seconds: since midnight. marker: the marker bit in it.
  * @typedef {{_seconds: number, _marker: number}} TimeCode
@@ -22,11 +24,9 @@ const MARKER_EVERY = 4;
  * A plane. face, body: null where the plane carries none. row: values of the face's slots, then of the body's, then the
  * flags viseme_def, init_face and expression_def. bit, stop: where it lies. doubtful: it depends on ranges that may have
  * been replaced in a lost plane. rate, timeCode: of I planes that send one.
- * @typedef {{intra: boolean, rate?: Fraction, timeCode?: TimeCode, skip: number, face: Part | null, body: Part | null,
- *   row: Int32Array, bit: number, stop: number, doubtful: boolean}} Plane
+ * @typedef {{_rate?: import("./fraction.js").Fraction, _timeCode?: TimeCode, _skip: number, _face: Part | null,
+ *   _body: Part | null, _row: Int32Array, _stop: number, _shown: {bit: number, intra: boolean, doubtful: boolean}}} Plane
  */
-
-const numbers = () => new Int32Array(SLOTS);
 
 /**
  * Return the functions of a reader of planes.
@@ -36,17 +36,11 @@ const numbers = () => new Int32Array(SLOTS);
 export function planeReader(input, fail) {
   /** Of the slots that were sent so far. @type {import("./coder.js").Model[]} */
   const models = [];
-  const minimum = [numbers(), numbers()]; // smallest levels in P planes, in I planes
-  const step = numbers();
-  const last = numbers();
-  // Of the plane that is being read:
-  const symbols = numbers();
-  const values = numbers();
   /** Of the object's BAP steps. @type {import("./parameters.js").BapSteps} */
   let table;
-  /** Ranges of the slots: I max, I min, P max, P min. @type {Float32Array[]} */
+  /** Ranges of the slots: I max, I min, P max, P min. @type {number[][]} */
   let limits;
-  /** Of the face at FACE, of the body at BODY. @type {(Part | undefined)[]} */
+  /** Of the face at FACE, of the body at BODY, as far as they were sent. @type {Part[]} */
   let settings;
   let doubtfulRanges = 0; // parts whose ranges may have been replaced in a lost plane
 
@@ -64,13 +58,13 @@ export function planeReader(input, fail) {
     const intra = bits(1) > 0;
     const mask = bits(2);
     if (!mask) fail("object mask 0", bit + 1);
-    /** @type {Plane["rate"]} */
+    /** @type {Plane["_rate"]} */
     let rate;
-    /** @type {Plane["timeCode"]} */
+    /** @type {Plane["_timeCode"]} */
     let timeCode;
     if (intra && bits(1)) {
       const sixteenths = bits(12); // frame_rate and seconds, with 8 and 4 bits
-      rate = new Fraction(sixteenths * 125, bits(1) ? 2002 : 2000);
+      rate = fraction(sixteenths * 125, bits(1) ? 2002 : 2000);
       if (!sixteenths) fail("frame rate 0", input._bit - 13);
     }
     if (intra && bits(1)) {
@@ -79,46 +73,48 @@ export function planeReader(input, fail) {
       timeCode = { _seconds: minutes * 60 + bits(6), _marker: marker };
     }
     const parts = [FACE, BODY].filter((part) => mask & part);
-    if (!intra && parts.some((part) => !settings[part])) fail("a P plane before the I plane of its part", bit);
+    if (!intra && parts.some((part) => !settings[part])) fail("P plane before an I plane", bit);
     const skip = bits(1) && readSkip();
-    let size = FLAG_SLOTS.length;
-    values.fill(0, FLAGS, FIRST_BAP);
-    const used = parts.map((part) => {
-      const now = intra ? readPart(part) : /** @type {Part} */ (settings[part]);
+    const flags = [0, 0, 0];
+    /** @type {Part[]} */
+    const used = [];
+    for (const part of parts) {
+      const { _slots: slots, _segments: segments } = (used[part] = intra ? readPart(part) : settings[part]);
       const begin = input._bit;
-      for (const [first, stop, flags] of now._segments) {
-        decodeSegment(input, fail, models, now._slots, first, stop, intra, symbols);
-        for (let flag = 1; flag <= flags; flag += 1) values[FLAGS + flags + flag - 2] = bits(1);
+      for (const [among, count] of segments) {
+        decodeSegment(input, fail, models, among, intra);
+        for (let flag = 0; flag < count; flag += 1) flags[count - 1 + flag] = bits(1);
       }
-      if (intra) computeValues(now, intra, begin);
-      size += now._slots.length;
-      return now;
-    });
-    if (!intra) for (const part of used) computeValues(part, intra, bit);
-    // Nothing is wrong with the plane: only now it changes what later ones depend on.
-    parts.forEach((part, at) => (settings[part] = used[at]));
-    const row = new Int32Array(size);
-    let place = 0;
-    for (const slots of [...used.map((part) => part._slots), FLAG_SLOTS]) {
-      for (const slot of slots) {
-        if (!intra && place < size - 3) learn(models[slot], symbols[slot]);
-        row[place++] = last[slot] = values[slot];
-      }
+      if (intra) computeValues(slots, intra, begin);
     }
+    if (!intra) used.forEach(({ _slots: slots }) => computeValues(slots, intra, bit));
+    // Nothing is wrong with the plane: only now it changes what later ones depend on.
+    Object.assign(settings, used);
+    /** @type {number[]} */
+    const row = [];
+    used.forEach(({ _slots: slots }) => {
+      for (const slot of slots) {
+        const model = models[slot];
+        if (!intra) learn(model, model._symbol);
+        row.push((model._last = model._value));
+      }
+    });
     return {
-      intra, rate, timeCode, skip, row, bit, stop: input._bit, face: mask & FACE ? used[0] : null,
-      body: mask & BODY ? used[used.length - 1] : null, doubtful: (mask & doubtfulRanges) > 0,
+      _rate: rate, _timeCode: timeCode, _skip: skip, _row: new Int32Array([...row, ...flags]), _stop: input._bit,
+      _face: used[FACE] ?? null, _body: used[BODY] ?? null,
+      _shown: { bit, intra, doubtful: (mask & doubtfulRanges) > 0 },
     };
   }
 
-  /** Compute the values of symbols, which must lie within the bounds. @param {Part} part @param {boolean} intra @param {number} bit that is named in an error */
-  function computeValues({ _slots: slots }, intra, bit) {
+  /** Compute the values of symbols, which must lie within the bounds. @param {number[]} slots @param {boolean} intra @param {number} bit that is named in an error */
+  function computeValues(slots, intra, bit) {
     for (const slot of slots) {
-      const value = (symbols[slot] + minimum[Number(intra)][slot]) * step[slot] + (intra ? 0 : last[slot]);
+      const model = models[slot];
+      const value = (model._symbol - (intra ? model._intraMin : model._min)) * model._step + (intra ? 0 : model._last);
       if (value !== (value | 0) || (slot < FIRST_FAP && (value < lowest(slot) || value > HIGHEST[slot]))) {
         fail(`${label(slot)} out of range`, bit);
       }
-      values[slot] = value;
+      model._value = value;
     }
   }
 
@@ -127,16 +123,16 @@ export function planeReader(input, fail) {
     const [groups, base] = PARTS[part];
     const mask = new Uint8Array(groups.flat().length);
     const interpolated = mask.slice();
-    /** Columns that are sent. @type {number[]} */
-    const columns = [];
+    /** @type {number[]} */
+    const slots = [];
     const quant = bits(5);
     for (const group of groups) {
       const type = bits(3); // 4 none, 5 masked, 6 masked and the others interpolated, 7 all
       if (type < 4) failMarker(3);
       if (type === 6 && part === BODY) fail("BAPs to interpolate", input._bit - 2);
       for (const column of group) {
-        if ((mask[column] = type % 4 % 3 ? bits(1) : Number(type > 6))) columns.push(column);
-        else interpolated[column] = Number(type === 6);
+        if ((mask[column] = type % 4 % 3 ? bits(1) : +(type > 6))) slots.push(base + column);
+        else interpolated[column] = +(type === 6);
       }
     }
     if (bits(2) & 1) fail("DCT segments", input._bit - 1, "unsupported"); // the bit before it is the gender
@@ -144,7 +140,7 @@ export function planeReader(input, fail) {
     const ranges = limits.map((list, number) => {
       const range = list.slice();
       if (sent & (8 >> number)) {
-        for (const group of groups.slice(Number(part === FACE))) { // FAP 1 and 2 have no ranges
+        for (const group of groups.slice(+(part === FACE))) { // FAP 1 and 2 have no ranges
           group.forEach((column, member) => {
             if (member % MARKER_EVERY === 0 && !bits(1)) failMarker(1);
             if (mask[column]) range[base + column] = RANGE_UNIT * bits(5);
@@ -158,23 +154,24 @@ export function planeReader(input, fail) {
 
     let now = settings[part];
     if (!now || !same(mask, now.mask) || !same(interpolated, now.interpolated)) {
-      now = { mask, interpolated, ...layout(part, base, columns) };
+      const segments = VISEME_AND_EXPRESSION.filter((_, column) => part === FACE && mask[column]);
+      segments.push([slots.filter((slot) => slot >= FIRST_FAP), 0]);
+      now = { mask, interpolated, _slots: segments.flatMap(([among]) => among), _segments: segments };
     }
     const scale = scaleOf(part, quant);
-    let lacking = SLOTS; // first slot without a range
     for (const slot of now._slots) {
-      let [iMax, iMin, pMax, pMin] = limits.map((list) => Math.floor(list[slot] / scale));
+      let [intraMax, intraMin, max, min] = limits.map((list) => Math.floor(list[slot] / scale));
       if (slot < FIRST_FAP) {
-        iMin = 0;
-        iMax = pMax = pMin = amountLimit(slot, quant);
+        intraMin = 0;
+        intraMax = max = min = amountLimit(slot, quant);
       }
-      if (iMax + iMin + pMax + pMin >= 0) models[slot] = newModel(iMax + iMin + 1, pMax + pMin + 1);
-      else lacking = Math.min(lacking, slot);
-      minimum[0][slot] = -pMin;
-      minimum[1][slot] = -iMin;
-      step[slot] = stepOf(slot, table, quant && scale);
+      const size = max + min + 1;
+      if (!(intraMax + intraMin + size > 0)) fail(`no range for ${label(slot)}`, input._bit);
+      models[slot] = /** @type {import("./coder.js").Model} */ ({
+        _intraSize: intraMax + intraMin + 1, _size: size, _intraMin: intraMin, _min: min, _step: stepOf(slot, table, quant && scale),
+        _total: size, _added: UNUSED, _tree: UNUSED,
+      });
     }
-    if (lacking < SLOTS) fail(`no range for ${label(lacking)}`, input._bit);
     return now;
   }
 
@@ -187,7 +184,7 @@ export function planeReader(input, fail) {
     let word;
     do {
       skip += word = bits(4);
-      if (skip > SKIP_MAX) fail("too many frames to skip", input._bit - 4);
+      if (skip > SKIP_MAX) fail("too many frames skipped", input._bit - 4);
     } while (word === 15);
     return skip;
   }
@@ -207,25 +204,3 @@ export function planeReader(input, fail) {
 
 /** @param {Uint8Array} one @param {Uint8Array} other */
 const same = (one, other) => one.every((value, at) => value === other[at]);
-
-/** Return slots and segments of the columns that are sent. @param {number} part @param {number} base @param {number[]} columns */
-function layout(part, base, columns) {
-  /** @type {[number, number, number][]} */
-  const segments = [];
-  /** @type {number[]} */
-  const slots = [];
-  const add = (/** @type {number} */ flags, /** @type {number[]} */ ...more) =>
-    segments.push([slots.length, slots.push(...more), flags]);
-  if (part === FACE) {
-    if (columns[0] === 0) {
-      add(1, 0, 1, 2);
-      columns.shift();
-    }
-    if (columns[0] === 1) {
-      add(2, 3, 4, 5, 6);
-      columns.shift();
-    }
-  }
-  add(0, ...columns.map((column) => base + column));
-  return { _slots: Int32Array.from(slots), _segments: segments };
-}

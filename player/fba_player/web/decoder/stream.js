@@ -3,16 +3,17 @@ import { END, OBJECT_ENDS, OUT_OF_DATA, SEQUENCE, USER_DATA, codeAt, findCode, i
 import { makeClock } from "./clock.js";
 import { FbaError } from "./errors.js";
 import { streamFrame } from "./frames.js";
-import { bytesNeeded, crc32, findMarks, isTable, readMark, writtenCheck } from "./marks.js";
+import { bytesNeeded, crc32, findMarks, isTable, otherSteps, readMark, writtenCheck } from "./marks.js";
 import { planeReader } from "./planes.js";
 
 /**
  * A plane in the stream, where it has a number. bit: of the start code before it, if there is one.
- * @typedef {import("./planes.js").Plane & {number: number, index: number, span: import("./clock.js").Span}} StreamPlane
+ * @typedef {import("./planes.js").Plane & {_span: import("./clock.js").Span,
+ *   _shown: {plane: number, bits: number, index: number}}} StreamPlane
  */
 
 export const NO_END = "no end code 00 00 01 b1";
-const NO_START = "no object start code 00 00 01 ba";
+const NO_START = "no start code 00 00 01 ba";
 const LONG = 4096; // bytes that are kept anyway, and those beyond which an incomplete plane is not tried with every byte
 const DAMAGE_BYTES = 1000; // memory of a damage with its error
 const PLANE_BYTES = 500; // memory of a plane without its values
@@ -32,9 +33,9 @@ const MOST_PERIODS = 1 << 18; // that are checked: three days with an I plane ev
  * @typedef {{error: FbaError, start: number, stop: number, framesLost: number | null,
  *   uncertainty: number | null, doubtful: [number, number] | null}} Damage
  *
- * What a whole stream holds. wrong: planes of I periods that do not match their checks: first, and behind the last.
- * open: whether nothing ended the last object.
- * @typedef {{_planes: StreamPlane[], _wrong: [number, number][], _open: boolean}} Whole
+ * What a complete stream holds: planes; those of I periods that do not match their checks, as the number of the first and
+ * of that behind the last; whether nothing ended the last object.
+ * @typedef {[StreamPlane[], [number, number][], boolean]} Whole
  */
 
 /** @param {Uint8Array | ArrayBuffer} data */
@@ -51,7 +52,7 @@ export class Decoder {
    * @param {Uint8Array} [whole] the complete stream, where `decode` calls it
    */
   constructor({ bapSteps, salvage = false, mostFrames = 6e6, mostBytes = 1e8 } = {}, whole) {
-    if (bapSteps !== undefined && !isTable(bapSteps)) throw new FbaError("option", 'bapSteps: expected "iso" or "visage"');
+    if (bapSteps !== undefined && !isTable(bapSteps)) throw new FbaError("option", "bapSteps: expected iso or visage");
     /** What is odd in the stream so far. @type {string[]} */
     const warnings = (this.warnings = []);
     /** Damage so far, when salvaging. @type {Damage[]} */
@@ -63,7 +64,7 @@ export class Decoder {
 
     // ---- the bytes that came and are still needed; all places are bytes or bits from the start of the stream
     const input = { _data: whole ?? new Uint8Array(0), _first: 0, _bit: 0 };
-    const end = () => input._first + input._data.length;
+    let end = input._data.length;
     const byteAt = (/** @type {number} */ byte) => input._data[byte - input._first];
     const startCodeAt = (/** @type {number} */ byte) => codeAt(input._data, byte - input._first);
     const bytes = (/** @type {number} */ from, /** @type {number} */ to) => input._data.subarray(from - input._first, to - input._first);
@@ -79,6 +80,7 @@ export class Decoder {
         input._data = larger.subarray(0, size);
       }
       input._data.set(piece, length);
+      end += piece.length;
     }
 
     /** Drop the bytes that neither the next plane needs, nor a look for start codes behind damage. */
@@ -87,7 +89,7 @@ export class Decoder {
       const dropped = needed - input._first;
       if (dropped >= LONG && 2 * dropped >= input._data.length) {
         sumUp(needed);
-        input._data = bytes(needed, end());
+        input._data = bytes(needed, end);
         input._first = needed;
       }
     }
@@ -111,9 +113,10 @@ export class Decoder {
     let state = findObject;
 
     /** @param {string} finding @param {number} at bit */
-    const fault = (finding, at, plane = planes) => new FbaError("damage", finding, plane, at);
+    const fault = (finding, at, plane = planes, /** @type {import("./errors.js").Kind} */ kind = "damage") =>
+      new FbaError(kind, finding, plane, at);
     const reader = planeReader(input, (finding, at, kind) => {
-      throw new FbaError(kind ?? "damage", finding, planes, at);
+      throw fault(finding, at, planes, kind);
     });
     const clock = makeClock(
       salvage,
@@ -135,13 +138,13 @@ export class Decoder {
           if (plane === null) break;
           if (plane) {
             found.push(plane);
-            memory += PLANE_BYTES + plane.row.byteLength;
+            memory += PLANE_BYTES + plane._row.byteLength;
           }
           const exceeded =
             found.length > mostFrames ? "mostFrames"
-            : memory + DAMAGE_BYTES * damage.length > mostBytes + GROWTH * end() ? "mostBytes"
+            : memory + DAMAGE_BYTES * damage.length > mostBytes + GROWTH * end ? "mostBytes"
             : "";
-          if (exceeded) throw new FbaError("limit", `more than ${exceeded}`, undefined, undefined, "raise it");
+          if (exceeded) throw new FbaError("limit", `more than ${exceeded}`);
         } catch (error) {
           if (!(error instanceof FbaError)) throw error;
           if (salvage && error.kind !== "limit") skipDamage(error);
@@ -190,7 +193,7 @@ export class Decoder {
     /** Look for the object start code; headers of other layers may come before it. @param {boolean} final */
     function findObject(final) {
       if (!count && !scanned && !startError) {
-        if ([0, 0, 1].some((byte, place) => (input._data[place] ?? byte) !== byte) || (final && end() < 4)) {
+        if ([0, 0, 1].some((byte, place) => (input._data[place] ?? byte) !== byte) || (final && end < 4)) {
           startError = fault(NO_START, 0);
           if (!salvage) throw startError;
         }
@@ -200,13 +203,13 @@ export class Decoder {
         const joins = isPlane(code) && beginsIntra(at + 4); // an object whose start is missing
         if (isPlane(code)) {
           if (count) lostFrom = 8 * objectEnd;
-          const outside = fault("a plane outside of an object", 8 * at);
+          const outside = fault("plane outside an object", 8 * at);
           if (count || !salvage) throw outside;
-          if (at + 4 === end() && !final) break; // the first bit of the plane is not here yet
+          if (at + 4 === end && !final) break; // the first bit of the plane is not here yet
           startError ??= joins ? fault(NO_START, 0) : outside;
         }
-        const content = bytes(at + 4, end());
-        const needed = code === USER_DATA ? bytesNeeded(content, Math.max(objectEnd - objectBegin, 0)) : 0;
+        const content = bytes(at + 4, end);
+        const needed = code === USER_DATA ? bytesNeeded(content, objectEnd - objectBegin) : 0;
         if (needed > content.length && !final) break; // a mark may not be complete
         takeOutside(code, at, content.subarray(0, needed));
         scanned = at + 4;
@@ -220,7 +223,7 @@ export class Decoder {
       }
       if (!final) bit = Math.max(bit, 8 * scanned);
       else if (!count) throw fault(NO_START, 0);
-      else if (!inUserData && end() > objectEnd) warnings.push(`${end() - objectEnd} bytes behind the end`);
+      else if (!inUserData && end > objectEnd) warnings.push(`${end - objectEnd} bytes behind the end`);
       return null;
     }
 
@@ -233,7 +236,7 @@ export class Decoder {
 
     /** Decode the next plane, or take the next start code. @param {boolean} final */
     function decodePlanes(final) {
-      if (end() < retryAt && !final) return null;
+      if (end < retryAt && !final) return null;
       let inPlane = false;
       input._bit = bit;
       try {
@@ -247,16 +250,16 @@ export class Decoder {
       }
       if (final && inPlane) {
         recent = recentSkips = []; // a cut leaves the planes before it alone
-        throw fault("the stream ends inside this plane", 8 * end());
+        throw fault("the stream ends in this plane", 8 * end);
       }
       if (final) {
-        if (planes && salvage) addDamage(fault(NO_END, 8 * end(), planes - 1), Math.min(Math.ceil(bit / 8), end()), end());
-        bit = 8 * end();
-        objectEnd = end();
+        if (planes && salvage) addDamage(fault(NO_END, 8 * end, planes - 1), Math.min(Math.ceil(bit / 8), end), end);
+        bit = 8 * end;
+        objectEnd = end;
         state = findObject;
       } else if (inPlane) {
-        const waiting = end() - bit / 8;
-        retryAt = end() + (waiting > LONG ? waiting / 4 : 0);
+        const waiting = end - bit / 8;
+        retryAt = end + (waiting > LONG ? waiting / 4 : 0);
       }
       return null;
     }
@@ -284,30 +287,32 @@ export class Decoder {
 
     /** Give a plane its number and its time, and move on past it. @param {import("./planes.js").Plane} plane @returns {StreamPlane} */
     function place(plane) {
+      const { _shown: shown, _skip: skip } = plane;
       const startCode = codeBit !== null;
-      planeBit = plane.bit;
-      bit = plane.stop;
-      if (plane.intra) {
+      planeBit = shown.bit;
+      bit = plane._stop;
+      if (shown.intra) {
         clock._beginIntra(plane, startCode, resuming, resuming ? estimate() : null);
         beginPeriod(planeBit - (startCode ? 32 : 0));
       }
       if (salvage) {
         recent = [...recent, planeBit].slice(-DOUBTFUL);
-        recentSkips = [...recentSkips, plane.skip].slice(-DOUBTFUL);
+        recentSkips = [...recentSkips, skip].slice(-DOUBTFUL);
         bitsRead += bit - planeBit;
-        framesRead += plane.skip + 1;
+        framesRead += skip + 1;
       }
-      plane.bit = codeBit ?? planeBit;
+      shown.bit = codeBit ?? planeBit;
       codeBit = null;
-      hasBody ||= plane.body !== null;
-      return Object.assign(plane, clock._next(plane.skip), { number: planes++ });
+      hasBody ||= plane._body !== null;
+      const [index, span] = clock._next(skip);
+      return Object.assign(plane, { _span: span, _shown: Object.assign(shown, { index, plane: planes++, bits: bit - shown.bit }) });
     }
 
     /** Look, behind damage, for the next start code of an object, or of a plane that is an I plane. @param {boolean} final @returns {undefined | null} */
     function resynchronise(final) {
       for (let code; (code = nextCode()) !== undefined; ) {
         const at = scanned;
-        const last = at + 4 === end();
+        const last = at + 4 === end;
         if ((isPlane(code) || isObject(code)) && last && !final) return null; // the first bit of the plane is not here yet
         if (isObject(code) ? !last : isPlane(code) && beginsIntra(at + 4)) {
           endDamage(at);
@@ -318,10 +323,10 @@ export class Decoder {
       bit = 8 * scanned;
       if (!final) return null;
       // Only user data may follow the end code.
-      let stop = end();
+      let stop = end;
       while (stop > lastDamage().start && startCodeAt(stop - 4) !== END) stop -= 1;
-      const isEnd = stop >= lastDamage().start + 4 && (stop === end() || startCodeAt(stop) === USER_DATA);
-      endDamage(isEnd ? stop : end());
+      const isEnd = stop >= lastDamage().start + 4 && (stop === end || startCodeAt(stop) === USER_DATA);
+      endDamage(isEnd ? stop : end);
       resume(isEnd ? estimate() : null);
       if (!isEnd || !count || wasAtEnd) return null;
       wasAtEnd = true;
@@ -445,28 +450,27 @@ export class Decoder {
         inHeaders = true;
         before = null;
       }
-      const found = code === USER_DATA && (directly || inHeaders) && readMark(content);
+      if (code !== USER_DATA || !(directly || inHeaders)) return;
+      const useless = directly && endCode !== END;
+      const found = readMark(content, useless ? [] : warnings);
       if (!found) return;
-      const named = found.table;
-      if (directly && endCode !== END) warnings.push("mark not used: the end code before it is damaged");
-      else {
-        warnings.push(...found.problems);
-        if (!directly) {
-          if (before && named && named !== before) warnings.push(`BAP steps ${named} in a mark, before ${before}`);
-          before ??= named;
-        } else {
-          checks = found.checks;
-          if (named && named !== this.mark) {
-            this.mark = named;
-            compareTables();
-          }
+      const named = found[0];
+      if (useless) warnings.push("mark: no end code before it");
+      else if (!directly) {
+        if (before && named && named !== before) warnings.push(otherSteps(named, before));
+        before ??= named;
+      } else {
+        checks = found[1];
+        if (named && named !== this.mark) {
+          this.mark = named;
+          compareTables();
         }
       }
     };
 
     /** Warn where the object was decoded with another table than that of its mark. */
     const compareTables = () => {
-      if (this.mark && this.mark !== table && hasBody) warnings.push(`BAP steps ${this.mark} in the mark, ${table} used`);
+      if (this.mark && this.mark !== table && hasBody) warnings.push(otherSteps(this.mark, table));
     };
 
     // ---- checks of I periods: an I plane with the planes up to the next one, from its start code, or the byte in which
@@ -537,7 +541,7 @@ export class Decoder {
       for (const [check, begin, first, stop] of periods) {
         if ((last.get(check) ?? -1) >= following) following = listed.indexOf(check, following) + 1;
         else {
-          report(`planes to ${stop - 1} do not match their CRC-32`, begin, first, stop);
+          report(`planes to ${stop - 1} do not match their check`, begin, first, stop);
           bad += 1;
         }
       }
@@ -549,10 +553,9 @@ export class Decoder {
       beginChecks(0);
     }
 
-    /** What a complete stream holds. @type {Whole | null} */
-    this._whole = null;
     if (whole) {
-      this._whole = { _planes: advance(false).concat(advance(true)), _wrong: wrong, _open: endCode === null };
+      /** @type {Whole | undefined} */
+      this._whole = [advance(false).concat(advance(true)), wrong, endCode === null];
       if (failure) throw failure;
     }
   }
