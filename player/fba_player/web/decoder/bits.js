@@ -18,17 +18,17 @@ export const isPlane = (code) => code === 0xbb || code === 3;
  * @typedef {{_data: Uint8Array, _first: number, _bit: number}} Input
  */
 
-/** Return a bit, or NaN behind the end. @param {Uint8Array} data @param {number} bit */
-export const bitAt = (data, bit) => (bit < 8 * data.length ? (data[bit >> 3] >> (7 - (bit & 7))) & 1 : NaN);
+/** Return a bit; 0 behind the end. @param {Uint8Array} data @param {number} bit */
+export const bitAt = (data, bit) => (bit < 8 * data.length ? (data[bit >> 3] >> (7 - (bit & 7))) & 1 : 0);
 
 /** @param {Input} input @param {number} count up to 31 */
 export function read(input, count) {
+  const data = input._data;
+  let bit = input._bit - 8 * input._first;
   let value = 0;
-  for (; count; count -= 1) {
-    value = 2 * value + bitAt(input._data, input._bit - 8 * input._first);
-    input._bit += 1;
-  }
-  if (!(value >= 0)) throw OUT_OF_DATA;
+  input._bit += count;
+  for (; count; count -= 1) value = 2 * value + bitAt(data, bit++);
+  if (bit > 8 * data.length) throw OUT_OF_DATA;
   return value;
 }
 
@@ -53,7 +53,7 @@ export function takeStartCode(input, afterCode) {
 }
 
 /** Return the last byte of a start code 00 00 01 xx; undefined where none stands. @param {Uint8Array} data @param {number} at */
-export const codeAt = (data, at) => (data[at] || data[at + 1] || data[at + 2] !== 1 ? undefined : data[at + 3]);
+export const codeAt = (data, at) => (data[at] !== 0 || data[at + 1] || data[at + 2] !== 1 ? undefined : data[at + 3]);
 
 /** Return where the next start code begins, or may begin when more data come. @param {Uint8Array} data @param {number} at */
 export function findCode(data, at) {

@@ -1,5 +1,5 @@
 /** Times of planes from frame rate, skips and time codes, as exact fractions; behind damage the most likely ones. */
-import { compare, fraction, greatestDivisor, inverse, nearest, product, sum, text, value } from "./fraction.js";
+import { compare, fraction, greatestDivisor, inverse, nearest, product, sum, value } from "./fraction.js";
 
 /** @typedef {import("./fraction.js").Fraction} Fraction */
 
@@ -116,12 +116,12 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
       if (!stated && !before) warn("no frame rate, 25 assumed");
       let rate = stated ?? before ?? fraction(25);
       if (salvage && stated && doubtsRate(rate, before) && before) {
-        refused = `frame rate ${text(rate)} not used`;
+        refused = `frame rate ${value(rate)} not used`;
         rate = before;
       }
       const sameRate = equal(rate, before);
       if (!sameRate) {
-        if (before) warn(`frame rate ${text(rate)}, before ${text(before)}`);
+        if (before) warn(`frame rate ${value(rate)}, before ${value(before)}`);
         const [above, below] = product(now, rate);
         index = Number((above + below - 1n) / below);
         span = { _rate: rate, _anchor: now, _anchorIndex: index };
@@ -160,8 +160,7 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
         }
         addRestart(behindLoss);
       }
-      if (!sameRate) catchingUp = false; // indices of another rate
-      else if (moved < 0) catchingUp = !mayStepBack;
+      catchingUp = sameRate && (moved < 0 ? !mayStepBack : catchingUp); // not with indices of another rate
       const gained = Math.max(moved, 0);
       if (behindLoss) resume(jump === null ? lost : [gained, 0]);
       else if (salvage && (moved < 0 || (agreed && moved))) {

@@ -16,10 +16,10 @@ export const UNUSED = new Uint16Array(4096); // counts before the first symbol, 
 
 /**
  * What is known of a slot since the last I plane: sizes of the alphabets in I planes and in P planes, the smallest levels,
- * the quantiser step. Of the coder in P planes: total: sum of all counts; added: what was added to each; tree: a Fenwick
- * tree over that. symbol, value: of the plane that is being read. last: value of the plane before it.
+ * the quantiser step. Of the coder in P planes: total: sum of all counts; belowUsual: of those below the symbol `_min`, which
+ * is that of no change, the most frequent; added: what was added to each; tree: a Fenwick tree over that. symbol, value: of the plane that is being read. last: value of the plane before it.
  * @typedef {{_intraSize: number, _size: number, _intraMin: number, _min: number, _step: number, _total: number,
- *   _added: Uint16Array, _tree: Uint16Array, _symbol: number, _value: number, _last: number}} Model
+ *   _belowUsual: number, _added: Uint16Array, _tree: Uint16Array, _symbol: number, _value: number, _last: number}} Model
  */
 
 /** Raise the count of a symbol. @param {Model} model @param {number} symbol */
@@ -29,10 +29,12 @@ export function learn(model, symbol, amount = 1) {
     model._added = new Uint16Array(size);
     model._tree = new Uint16Array(size + 1);
     model._total = size;
+    model._belowUsual = model._min;
     if (old !== UNUSED) old.forEach((added, at) => learn(model, at, added >> 1)); // halve every count, rounding up
   }
   model._added[symbol] += amount;
   model._total += amount;
+  if (symbol < model._min) model._belowUsual += amount;
   for (let node = symbol + 1; node <= size; node += node & -node) model._tree[node] += amount;
 }
 
@@ -47,6 +49,7 @@ export function learn(model, symbol, amount = 1) {
 export function decodeSegment(input, fail, models, slots, intra) {
   const data = input._data;
   const origin = 8 * input._first;
+  const end = 8 * data.length;
   let bit = input._bit - origin;
   let low = 0;
   let high = 0;
@@ -54,8 +57,8 @@ export function decodeSegment(input, fail, models, slots, intra) {
   let zeros = 0;
   let taken = 0; // bits without the inserted ones
   let guardAt = -1; // `taken` at the last inserted bit
-  let badGuard = NaN;
-  let badGuardAt = Infinity;
+  let badGuard = 0;
+  let badGuardAt = 1e9; // `taken` at the first 0 in its place
   for (let place = 0; ; place += 1) {
     for (;;) {
       if (high >= HALF) {
@@ -69,7 +72,7 @@ export function decodeSegment(input, fail, models, slots, intra) {
       high = 2 * high + 1;
       if (zeros === GUARD) {
         guardAt = taken;
-        if (!(badGuard >= 0) && bitAt(data, bit) === 0) {
+        if (badGuardAt > taken && bit < end && !bitAt(data, bit)) {
           badGuard = bit;
           badGuardAt = taken;
         }
@@ -87,21 +90,22 @@ export function decodeSegment(input, fail, models, slots, intra) {
     const span = high - low + 1;
     const total = intra ? model._intraSize : model._total;
     const target = total - 1 - ((((code - low + 1) * total - 1) / span) | 0); // counted from symbol 0 upwards
-    let symbol = target;
-    let below = target;
-    let share = 1;
-    if (!intra) {
-      const tree = model._tree;
+    const { _added: added, _tree: tree, _size: size } = model;
+    let symbol = intra ? target : model._min;
+    let below = intra ? target : model._belowUsual;
+    let share = 1 + (intra ? 0 : added[symbol]);
+    if (target < below || target >= below + share) {
       symbol = 0;
-      for (let step = 1 << (31 - Math.clz32(model._size)); step; step >>= 1) {
-        if (symbol + step > model._size) continue;
+      below = target;
+      for (let step = 1 << (31 - Math.clz32(size)); step; step >>= 1) {
         const weight = step + tree[symbol + step];
-        if (weight > below) continue;
-        symbol += step;
-        below -= weight;
+        if (symbol + step <= size && weight <= below) {
+          symbol += step;
+          below -= weight;
+        }
       }
       below = target - below;
-      share += model._added[symbol];
+      share = 1 + added[symbol];
     }
     model._symbol = symbol;
     high = low - 1 + (((span * (total - below)) / total) | 0);
@@ -113,7 +117,6 @@ export function decodeSegment(input, fail, models, slots, intra) {
   if (badGuardAt < taken) fail("22 zero bits without a 1", badGuard + origin);
   const after = bit - 14 - Number(guardAt >= taken);
   const closed = code >> 14 === (low < QUARTER ? 1 : 2);
-  const end = 8 * data.length;
   if (after > end || (!closed && bit > end)) throw OUT_OF_DATA; // with bits missing, it need not be damage
   if (!closed) fail("segment without an end", after - 2 + origin);
   input._bit = after + origin;

@@ -7,7 +7,7 @@ import { STEP_PLACES } from "./tables.js";
 
 /** @typedef {import("./parameters.js").BapSteps} BapSteps */
 
-const WORDS = /^fba (bap_steps=([^;=\0]{1,24});(bap_steps=[^;=\0]{1,24};)*)?(crc32=([^;=\0]{1,24});)?/;
+const WORDS = /^fba (bap_steps=([^;=\0]{1,24});(bap_steps=[^;=\0]{1,24};)*)?(crc32=((\d{1,9})|[^;=\0]{1,24});)?/;
 const MOST_MARK_BYTES = 64; // within which the words of a mark are complete
 
 /** Whether a table of BAP steps has this name. @param {string} name @returns {name is BapSteps} */
@@ -21,9 +21,9 @@ export const isTable = (name) => Object.hasOwn(STEP_PLACES, name);
  */
 function readWords(content) {
   const text = String.fromCharCode(...content.subarray(0, MOST_MARK_BYTES));
-  const [words, steps, named = "", , checks, count = ""] = WORDS.exec(text) ?? [""];
+  const [words, steps, named = "", , checks, , count = NaN] = WORDS.exec(text) ?? [""];
   const end = steps || checks ? words.length : 0;
-  return [isTable(named) ? named : null, end, /^\d{1,9}$/.test(count) ? +count : NaN, named, text];
+  return [isTable(named) ? named : null, end, +count, named, text];
 }
 
 /** Return how many bytes behind its start code a mark needs. @param {Uint8Array} content its beginning @param {number} most I periods */

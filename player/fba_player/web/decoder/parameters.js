@@ -18,8 +18,8 @@ export const RANGE_UNIT = 60;
 let scale = 0;
 const BAP_SCALES = [..."01112222333344444455555556666777"].map((more) => (scale += Number(more))); // 0 to 127
 
-/** Of the face at FACE, of the body at BODY: columns of each group, from 0 in coding order; slot of column 0. @type {[number[][], number][]} */
-export const PARTS = [[[], 0], [groups(FAP_GROUPS), FIRST_FAP - 2], [groups(BAP_GROUPS), FIRST_BAP]];
+/** Of the face at FACE, of the body at BODY: number of columns; those of each group, in coding order; slot of column 0. @type {[number, number[][], number][]} */
+export const PARTS = [[0, [], 0], [68, groups(FAP_GROUPS), FIRST_FAP - 2], [296, groups(BAP_GROUPS), FIRST_BAP]];
 
 /** @param {string} digits */
 function groups(digits) {
@@ -44,8 +44,8 @@ export const amountLimit = (slot, quant) =>
 /** Return the quantiser step of a slot; selects have none. @param {number} slot @param {BapSteps} table @param {number} scale 0 without a quantiser */
 export const stepOf = (slot, table, scale) => (STEPS[+STEP_PLACES[table][slot]] ?? 1) * scale || 1;
 
-/** Default ranges as magnitudes, of all slots I max, I min, P max, P min; extension BAPs have none. */
-export const DEFAULT_LIMITS = LIMITS.map((list) => [...list].map((digit) => RANGE_UNIT * parseInt(digit, 36)));
+/** Default ranges as magnitudes, in units of 60, of all slots I max, I min, P max, P min; extension BAPs have none. */
+export const DEFAULT_LIMITS = LIMITS.map((list) => [...list].map((digit) => parseInt(digit, 36)));
 
 /** Return the name of a slot's parameter. @param {number} slot */
 export const label = (slot) =>

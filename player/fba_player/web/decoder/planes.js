@@ -38,7 +38,7 @@ export function planeReader(input, fail) {
   const models = [];
   /** Of the object's BAP steps. @type {import("./parameters.js").BapSteps} */
   let table;
-  /** Ranges of the slots: I max, I min, P max, P min. @type {number[][]} */
+  /** Ranges of the slots, in units of 60: I max, I min, P max, P min. @type {number[][]} */
   let limits;
   /** Of the face at FACE, of the body at BODY, as far as they were sent. @type {Part[]} */
   let settings;
@@ -76,6 +76,7 @@ export function planeReader(input, fail) {
     if (!intra && parts.some((part) => !settings[part])) fail("P plane before an I plane", bit);
     const skip = bits(1) && readSkip();
     const flags = [0, 0, 0];
+    let size = 3;
     /** @type {Part[]} */
     const used = [];
     for (const part of parts) {
@@ -86,21 +87,23 @@ export function planeReader(input, fail) {
         for (let flag = 0; flag < count; flag += 1) flags[count - 1 + flag] = bits(1);
       }
       if (intra) computeValues(slots, intra, begin);
+      size += slots.length;
     }
-    if (!intra) used.forEach(({ _slots: slots }) => computeValues(slots, intra, bit));
+    if (!intra) for (const part of parts) computeValues(used[part]._slots, intra, bit);
     // Nothing is wrong with the plane: only now it changes what later ones depend on.
     Object.assign(settings, used);
-    /** @type {number[]} */
-    const row = [];
-    used.forEach(({ _slots: slots }) => {
-      for (const slot of slots) {
+    const row = new Int32Array(size);
+    let at = 0;
+    for (const part of parts) {
+      for (const slot of used[part]._slots) {
         const model = models[slot];
         if (!intra) learn(model, model._symbol);
-        row.push((model._last = model._value));
+        row[at++] = model._last = model._value;
       }
-    });
+    }
+    row.set(flags, at);
     return {
-      _rate: rate, _timeCode: timeCode, _skip: skip, _row: new Int32Array([...row, ...flags]), _stop: input._bit,
+      _rate: rate, _timeCode: timeCode, _skip: skip, _row: row, _stop: input._bit,
       _face: used[FACE] ?? null, _body: used[BODY] ?? null,
       _shown: { bit, intra, doubtful: (mask & doubtfulRanges) > 0 },
     };
@@ -120,8 +123,8 @@ export function planeReader(input, fail) {
 
   /** Read the header of a part of an I plane, and prepare the slots that it sends. @param {number} part */
   function readPart(part) {
-    const [groups, base] = PARTS[part];
-    const mask = new Uint8Array(groups.flat().length);
+    const [size, groups, base] = PARTS[part];
+    const mask = new Uint8Array(size);
     const interpolated = mask.slice();
     /** @type {number[]} */
     const slots = [];
@@ -143,7 +146,7 @@ export function planeReader(input, fail) {
         for (const group of groups.slice(+(part === FACE))) { // FAP 1 and 2 have no ranges
           group.forEach((column, member) => {
             if (member % MARKER_EVERY === 0 && !bits(1)) failMarker(1);
-            if (mask[column]) range[base + column] = RANGE_UNIT * bits(5);
+            if (mask[column]) range[base + column] = bits(5);
           });
         }
       }
@@ -160,16 +163,16 @@ export function planeReader(input, fail) {
     }
     const scale = scaleOf(part, quant);
     for (const slot of now._slots) {
-      let [intraMax, intraMin, max, min] = limits.map((list) => Math.floor(list[slot] / scale));
+      let [intraMax, intraMin, max, min] = limits.map((list) => Math.floor((RANGE_UNIT * list[slot]) / scale));
       if (slot < FIRST_FAP) {
         intraMin = 0;
         intraMax = max = min = amountLimit(slot, quant);
       }
-      const size = max + min + 1;
-      if (!(intraMax + intraMin + size > 0)) fail(`no range for ${label(slot)}`, input._bit);
+      const levels = max + min + 1;
+      if (!(intraMax + intraMin + levels > 0)) fail(`no range for ${label(slot)}`, input._bit);
       models[slot] = /** @type {import("./coder.js").Model} */ ({
-        _intraSize: intraMax + intraMin + 1, _size: size, _intraMin: intraMin, _min: min, _step: stepOf(slot, table, quant && scale),
-        _total: size, _added: UNUSED, _tree: UNUSED,
+        _intraSize: intraMax + intraMin + 1, _size: levels, _intraMin: intraMin, _min: min, _step: stepOf(slot, table, quant && scale),
+        _total: levels, _belowUsual: min, _added: UNUSED, _tree: UNUSED,
       });
     }
     return now;

@@ -85,7 +85,7 @@ export class Decoder {
 
     /** Drop the bytes that neither the next plane needs, nor a look for start codes behind damage. */
     function dropBytes() {
-      const needed = Math.floor(Math.min(bit, 8 * scanned || Infinity, codeBit ?? Infinity, recent[0] ?? Infinity) / 8);
+      const needed = Math.floor(Math.min(8 * scanned || bit, codeBit ?? bit, recent[0] ?? bit) / 8);
       const dropped = needed - input._first;
       if (dropped >= LONG && 2 * dropped >= input._data.length) {
         sumUp(needed);
@@ -102,7 +102,6 @@ export class Decoder {
     let bit = 0; // next one to decode
     let scanned = 0; // byte up to which no start code was found, while looking for one; 0 in an object
     let retryAt = 0; // end of the bytes with which an incomplete plane is tried again
-    let lostFrom = 0; // bit at which the current step began
     let planeBit = 0;
     /** @type {number | null} */
     let codeBit = null; // where the start code before the next plane begins
@@ -132,7 +131,6 @@ export class Decoder {
       const found = [];
       let memory = 0;
       while (!failure) {
-        lostFrom = bit;
         try {
           const plane = state(final);
           if (plane === null) break;
@@ -202,7 +200,7 @@ export class Decoder {
         const at = scanned;
         const joins = isPlane(code) && beginsIntra(at + 4); // an object whose start is missing
         if (isPlane(code)) {
-          if (count) lostFrom = 8 * objectEnd;
+          if (count) bit = 8 * objectEnd;
           const outside = fault("plane outside an object", 8 * at);
           if (count || !salvage) throw outside;
           if (at + 4 === end && !final) break; // the first bit of the plane is not here yet
@@ -273,16 +271,14 @@ export class Decoder {
         codeBit = null;
         endPeriod(byte);
       }
+      if (!isPlane(code) && !isObject(code) && !OBJECT_ENDS.includes(code)) {
+        const error = fault(`start code 00 00 01 ${code.toString(16)}, expected b1, ba or bb`, 8 * byte);
+        if (salvage) throw error;
+        warnings.push(error.message);
+      }
       bit = input._bit;
       if (isObject(code)) beginObject(byte);
-      else if (!isPlane(code)) {
-        if (!OBJECT_ENDS.includes(code)) {
-          const error = fault(`start code 00 00 01 ${code.toString(16)}, expected b1, ba or bb`, 8 * byte);
-          if (salvage) throw error;
-          warnings.push(error.message);
-        }
-        endObject(code, bit / 8);
-      }
+      else if (!isPlane(code)) endObject(code, byte + 4);
     }
 
     /** Give a plane its number and its time, and move on past it. @param {import("./planes.js").Plane} plane @returns {StreamPlane} */
@@ -334,9 +330,9 @@ export class Decoder {
       return undefined;
     }
 
-    /** List damage in the plane at `lostFrom`, and look for the next place to continue. @param {FbaError} error */
+    /** List damage in the plane that begins at `bit`, and look for the next place to continue. @param {FbaError} error */
     function skipDamage(error) {
-      const byte = count ? Math.floor(lostFrom / 8) : 0;
+      const byte = count ? Math.floor(bit / 8) : 0;
       scanned = recent.length ? Math.floor(recent[0] / 8) : count ? byte + 1 : Math.floor(bit / 8);
       if (resuming) lastDamage().framesLost = lastDamage().uncertainty = 0;
       else lossBegin = byte;
