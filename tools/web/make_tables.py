@@ -60,7 +60,7 @@ def make_tables() -> str:
             "};",
             f"const I_FACE = {face_limits[0]};",
             f"const P_BOTH = {face_limits[1][:-1]}{_digits(p_max)[1:]};",
-            "/** Default limits of all slots up to that of BAP 186, in units of 60: I max, I min, P max, P min. */",
+            "/** Default limits of all slots up to BAP 186, in units of 60: I max, I min, P max, P min. */",
             "export const LIMITS = [",
             f"  I_FACE + {_digits(i_max)},",
             f"  I_FACE + {_digits(i_min)},",
@@ -73,7 +73,7 @@ def make_tables() -> str:
 
 
 def _face(before: str, digits: str) -> str:
-    """Return a table of the slots of a face: of visemes and expressions, of FAPs 3 to 68, and of the flags."""
+    """Return a table of the slots of a face: visemes and expressions, FAPs 3 to 68, and the flags."""
     return f'"{before}{digits[1:-1]}000"'
 
 

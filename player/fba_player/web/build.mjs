@@ -10,7 +10,7 @@ const LICENCE = "MIT licence, Copyright (c) 2026 The fba developers";
 
 /** A bundle of each: the module it begins with, its file, its first line. */
 const BUNDLES = [
-  { entry: "fba.js", file: "fba.min.js", banner: `/*! fba.js: ${LICENCE} */` },
+  { entry: "fba.js", file: "fba.min.js", banner: `/*! ${LICENCE} */` },
   { entry: "fba-player.js", file: "fba-player.min.js", banner: `/*! A player of MPEG-4 FBA streams. ${LICENCE} */` },
   { entry: "fba-loader.js", file: "fba-loader.min.js", banner: `/*! MPEG-4 FBA streams for three.js. ${LICENCE} */` },
 ];

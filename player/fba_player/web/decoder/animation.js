@@ -1,8 +1,8 @@
 /** Whole streams. */
+import { partsOf } from "./frames.js";
 import { commonTimes } from "./clock.js";
 import { FbaError } from "./errors.js";
 import { text, value } from "./fraction.js";
-import { partsOf } from "./frames.js";
 import { Decoder, NO_END, bytesOf } from "./stream.js";
 
 /** The decoded frames of a stream. @typedef {ReturnType<typeof decode>} Animation */
@@ -62,8 +62,8 @@ function keptPlanes(index, wrong) {
     later = Math.min(later, index[at]);
   }
   kept.reverse();
-  const isWrong = new Uint8Array(index.length);
-  for (const [first, stop] of wrong) isWrong.fill(1, first, stop);
-  const right = kept.filter((at) => !isWrong[at]);
+  const marked = index.slice();
+  for (const [first, stop] of wrong) marked.fill(NaN, first, stop);
+  const right = kept.filter((at) => marked[at] >= 0);
   return right.length ? right : kept;
 }

@@ -10,12 +10,12 @@ const COMMON_RATE_MAX = 1e6; // highest rate that is chosen to make all times ex
 
 /**
  * A span of frames with one rate: the frame `index` is shown at anchor + (index - anchorIndex) / rate seconds.
- * @typedef {{_rate: Fraction, _anchor: Fraction, _anchorIndex: number}} Span
+ * @typedef {[Fraction, Fraction, number]} Span the rate, the anchor, its index
  */
 
 /** Return the seconds at which a frame is shown. @param {Span} span @param {number} index */
-export const timeIn = ({ _rate, _anchor, _anchorIndex }, index) =>
-  sum(_anchor, product(fraction(index - _anchorIndex), inverse(_rate)));
+export const timeIn = ([rate, anchor, anchorIndex], index) =>
+  sum(anchor, product(fraction(index - anchorIndex), inverse(rate)));
 
 /** @param {Fraction} one @param {Fraction | null | undefined} other */
 const equal = (one, other) => other != null && !compare(one, other);
@@ -83,10 +83,11 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
 
   /** @param {Fraction} rate @param {Fraction | undefined} before */
   function doubtsRate(rate, before) {
-    const [repeated, doubted] = [repeatedRates, doubtedRate];
+    const doubted = doubtedRate;
     doubtedRate = rate;
-    if (equal(rate, before)) repeatedRates += 1;
-    return !equal(rate, before) && !equal(rate, doubted) && repeated >= REPEATED_RATES;
+    if (!equal(rate, before)) return !equal(rate, doubted) && repeatedRates >= REPEATED_RATES;
+    repeatedRates += 1;
+    return false;
   }
 
   return {
@@ -110,7 +111,7 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
         // In a stream with time codes, the next one sets the clock; until then it must not be ahead.
         index += Math.max(lost[0] - (agreements && !regular ? lost[1] : 0), 0);
       }
-      const [agreed, before] = [agreements, span?._rate];
+      const [agreed, before] = [agreements, span?.[0]];
       const now = span ? timeIn(span, index) : fraction(0);
       let refused = "";
       if (!stated && !before) warn("no frame rate, 25 assumed");
@@ -124,7 +125,7 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
         if (before) warn(`frame rate ${value(rate)}, before ${value(before)}`);
         const [above, below] = product(now, rate);
         index = Number((above + below - 1n) / below);
-        span = { _rate: rate, _anchor: now, _anchorIndex: index };
+        span = [rate, now, index];
       }
       /** Frames by which the time code exceeds the count of planes. @type {number | null} */
       let jump = null;
@@ -148,7 +149,7 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
           if (ahead) frame = Math.max(frame, index);
           jump = frame - index;
           index = frame;
-          span = { _rate: rate, _anchor: seconds, _anchorIndex: frame };
+          span = [rate, seconds, frame];
         }
         if (jump !== null) [lastJump, codedIndex] = [jump, index];
       }
@@ -188,15 +189,15 @@ export function makeClock(salvage, mayStepBack, warn, report, resume) {
 export function commonTimes(planes) {
   /** @type {{_first: number, _index: number, _start: Fraction, _span: Span}[]} */
   const runs = [];
-  let highest = planes[0]._span._rate;
+  let highest = planes[0]._span[0];
   /** @type {Fraction | null} */
   let exact = highest;
   planes.forEach(({ _span: span, _shown: { index } }, first) => {
     const last = runs[runs.length - 1]?._span;
     if (last === span) return;
     const start = timeIn(span, index);
-    const rate = span._rate;
-    if (last && equal(rate, last._rate) && equal(start, timeIn(last, index))) return;
+    const rate = span[0];
+    if (last && equal(rate, last[0]) && equal(start, timeIn(last, index))) return;
     runs.push({ _first: first, _index: index, _start: start, _span: span });
     if (compare(rate, highest) > 0) highest = rate;
     for (const [above, below] of start[0] ? [rate, inverse(start)] : [rate]) {
@@ -206,7 +207,7 @@ export function commonTimes(planes) {
       if (value(exact) > COMMON_RATE_MAX) exact = null;
     }
   });
-  const same = runs.every(({ _span: span }) => equal(span._rate, highest));
+  const same = runs.every(({ _span: span }) => equal(span[0], highest));
   const rate = (!same && exact) || highest;
   let run = runs[0];
   let offset = fraction(0);
@@ -220,7 +221,7 @@ export function commonTimes(planes) {
       offset = product(run._start, rate);
       late = Math.max(following - nearest(offset), 0);
     }
-    const count = product(product(rate, inverse(run._span._rate)), fraction(index - run._index));
+    const count = product(product(rate, inverse(run._span[0])), fraction(index - run._index));
     following = nearest(sum(offset, count)) + late + 1;
     return following - 1;
   });

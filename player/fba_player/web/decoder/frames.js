@@ -28,14 +28,14 @@ export function partsOf({ _face: face, _body: body, _row: row }) {
   const [select1, select2, blend, ...expression] = values.subarray(0, FIRST_FAP);
   const [visemeDef, ...expressionFlags] = row.subarray(at);
   return {
-    face: face && {
+    face: face ? {
       values: values.subarray(FIRST_FAP - 2, FLAGS).fill(0, 0, 2),
       mask: face.mask,
       interpolated: face.interpolated,
       viseme: [select1, select2, blend, visemeDef],
       expression: [...expression, ...expressionFlags],
-    },
-    body: body && { values: values.subarray(FIRST_BAP), mask: body.mask },
+    } : null,
+    body: body ? { values: values.subarray(FIRST_BAP), mask: body.mask } : null,
   };
 }
 
@@ -43,6 +43,6 @@ export function partsOf({ _face: face, _body: body, _row: row }) {
 export const streamFrame = (plane) => ({
   ...plane._shown,
   time: value(timeIn(plane._span, plane._shown.index)),
-  rate: value(plane._span._rate),
+  rate: value(plane._span[0]),
   ...partsOf(plane),
 });

@@ -21,11 +21,11 @@ const VISEME_AND_EXPRESSION = [[[0, 1, 2], 1], [[3, 4, 5, 6], 2]];
  * seconds: since midnight. marker: the marker bit in it.
  * @typedef {{_seconds: number, _marker: number}} TimeCode
  *
- * A plane. face, body: null where the plane carries none. row: values of the face's slots, then of the body's, then the
+ * A plane. face, body: undefined where the plane carries none. row: values of the face's slots, then of the body's, then the
  * flags viseme_def, init_face and expression_def. bit, stop: where it lies. doubtful: it depends on ranges that may have
  * been replaced in a lost plane. rate, timeCode: of I planes that send one.
- * @typedef {{_rate?: import("./fraction.js").Fraction, _timeCode?: TimeCode, _skip: number, _face: Part | null,
- *   _body: Part | null, _row: Int32Array, _stop: number, _shown: {bit: number, intra: boolean, doubtful: boolean}}} Plane
+ * @typedef {{_rate?: import("./fraction.js").Fraction, _timeCode?: TimeCode, _skip: number, _face?: Part,
+ *   _body?: Part, _row: Int32Array, _stop: number, _shown: {bit: number, intra: boolean, doubtful: boolean}}} Plane
  */
 
 /**
@@ -104,7 +104,7 @@ export function planeReader(input, fail) {
     row.set(flags, at);
     return {
       _rate: rate, _timeCode: timeCode, _skip: skip, _row: row, _stop: input._bit,
-      _face: used[FACE] ?? null, _body: used[BODY] ?? null,
+      _face: used[FACE], _body: used[BODY],
       _shown: { bit, intra, doubtful: (mask & doubtfulRanges) > 0 },
     };
   }

@@ -272,7 +272,7 @@ export class Decoder {
         endPeriod(byte);
       }
       if (!isPlane(code) && !isObject(code) && !OBJECT_ENDS.includes(code)) {
-        const error = fault(`start code 00 00 01 ${code.toString(16)}, expected b1, ba or bb`, 8 * byte);
+        const error = fault(`unknown start code 00 00 01 ${code.toString(16)}`, 8 * byte);
         if (salvage) throw error;
         warnings.push(error.message);
       }
@@ -299,9 +299,10 @@ export class Decoder {
       }
       shown.bit = codeBit ?? planeBit;
       codeBit = null;
-      hasBody ||= plane._body !== null;
+      hasBody ||= !!plane._body;
       const [index, span] = clock._next(skip);
-      return Object.assign(plane, { _span: span, _shown: Object.assign(shown, { index, plane: planes++, bits: bit - shown.bit }) });
+      Object.assign(shown, { index, plane: planes++, bits: bit - shown.bit });
+      return Object.assign(/** @type {StreamPlane} */ (plane), { _span: span });
     }
 
     /** Look, behind damage, for the next start code of an object, or of a plane that is an I plane. @param {boolean} final @returns {undefined | null} */
@@ -531,13 +532,14 @@ export class Decoder {
         addDamage(error, byte, byte, null, first, stop);
         if (first < stop) wrong.push([first, stop]);
       };
+      /** @type {Map<string, any>} */
       const last = new Map(listed.map((check, at) => [check, at]));
       let following = 0;
       let bad = 0;
       for (const [check, begin, first, stop] of periods) {
-        if ((last.get(check) ?? -1) >= following) following = listed.indexOf(check, following) + 1;
+        if (last.get(check) >= following) following = listed.indexOf(check, following) + 1;
         else {
-          report(`planes to ${stop - 1} do not match their check`, begin, first, stop);
+          report(`planes to ${stop - 1}: wrong check`, begin, first, stop);
           bad += 1;
         }
       }

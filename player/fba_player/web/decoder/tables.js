@@ -14,7 +14,7 @@ export const STEP_PLACES = {
 };
 const I_FACE = "0000000iavaaaavvaaaiii7iiaakkffaa77ffffffffffaaiiiiivvvavaaaavvaa99cfffff000";
 const P_BOTH = "000000063a3333aa3336663aa447755332266666655553377777aaa3a3333aa3322334455000aaaaaaa66aa66aa66aa22aa22112222aaaa66aa66aa6666aaa2226662226662222222226662222222222226662222222226662222226662226662226662244222244442244222244442244222244441144112244444444444444aaaaaa";
-/** Default limits of all slots up to that of BAP 186, in units of 60: I max, I min, P max, P min. */
+/** Default limits of all slots up to BAP 186, in units of 60: I max, I min, P max, P min. */
 export const LIMITS = [
   I_FACE + "gggll88gg33ggddggdd33dd41226166vvv4ggqqggggbbbbvvv444bbb444bbb444444444bbb444444444444bbb444444444bbb444444bbb444bbb444bbb444427631111336624441111226633331111116642341111g8i2221111vvvvvv",
   I_FACE + "gggllggggppggddggdd33dd14221666ii4vgg11ggggbbbbvvv444bbb444bbb444444444bbb444444444444bbb444444444bbb444444bbb444bbb444bbb44jj7236nngg33jj4244nngg22jj3333nngg11jj2443nngg8g2iccddggvvvvvv",
