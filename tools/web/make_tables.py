@@ -38,7 +38,7 @@ def make_tables() -> str:
     replaced = f"{steps.index(64)}{steps.index(128)}"
     common = str(steps.index(170))
     last = visage_places[-7:-1]
-    derived = iso_places[1:-7].translate(str.maketrans(dict.fromkeys(replaced, common))) + last
+    derived = iso_places[1:-7].translate(str.maketrans(replaced, common * 2)) + last
     assert visage_places[1:-1] == derived
     face_steps = _face("0010101", _digits(map(steps.index, faps.tolist())))
     face_limits = [_face("0" * 7, _digits(limits[which, FAPS])) for which in (0, 2)]
