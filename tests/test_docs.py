@@ -80,6 +80,10 @@ ILLUSTRATIONS = {
     ): STORAGE,
     ("docs/cluster.md", "dask scheduler --host 10.0.0.1"): "needs several machines",
     ("docs/cluster.md", "fba archive make streams/ -o s3://training/faces"): STORAGE,
+    (
+        "docs/cluster.md",
+        "fba convert --batch s3://captures/monday s3://streams/monday --to fba --scheduler tcp://10.0.0.1:8786",
+    ): STORAGE,
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "./dev bounds"): "takes hours; .ci/run runs a part, tests/fuzz the command",
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",

@@ -66,6 +66,24 @@ class RemotePath:
         with self._storage("cannot be read") as (storage, path):
             return bool(storage.isfile(path))
 
+    def read_bytes(self) -> bytes:
+        """Return the content of the file."""
+        with self._storage("cannot be read") as (storage, path):
+            return bytes(storage.cat_file(path))
+
+    def download(self, local: str) -> None:
+        """Write the content of the file to a file of this machine."""
+        with self._storage("cannot be read") as (storage, path):
+            storage.get_file(path, local)
+
+    def walk(self) -> list[str]:
+        """Return the names of all files in and below the folder, with slashes; none without the folder."""
+        with self._storage("cannot be listed") as (storage, path):
+            storage.invalidate_cache()
+            head = str(path).rstrip("/")
+            found = [str(one) for one in storage.find(path)]
+            return [one.removeprefix(head).lstrip("/") for one in found if one != path]
+
     def glob(self, pattern: str) -> list[RemotePath]:
         """Return the files in the folder whose names fit a pattern; none without the folder."""
         with self._storage("cannot be listed") as (storage, path):

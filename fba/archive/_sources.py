@@ -7,8 +7,9 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
+from fba.archive._locations import Location, RemotePath
 from fba.errors import FormatError, ModelError, OptionError, did_you_mean
 from fba.formats import formats
 from fba.text_files import read_lines
@@ -26,26 +27,29 @@ class Source:
     it. sound_name: the sound file beside it, below the folder; sound: its path.
     """
 
-    path: Path
+    path: Location
     shown: str
     name: str
     subject: str | None = None
     labels: Mapping[str, str] = field(default_factory=dict)
     sound_name: str | None = None
-    sound: Path | None = None
+    sound: Location | None = None
 
 
-def find_sources(folders: Sequence[Path], *, leave_out: Sequence[Path] = ()) -> list[Source]:
+def find_sources(folders: Sequence[Location], *, leave_out: Sequence[Path] = ()) -> list[Source]:
     """Return the files in folders, and below them, whose suffix is that of a format that is read; by name.
 
-    folders: or files. With several, names begin with that of the folder. Hidden files and folders are left
-    out, and so are links to folders, and the files `leave_out`. Raises FormatError for a folder that cannot
-    be listed, and if two files have the same name.
+    folders: or files; a folder elsewhere is a `RemotePath`. With several, names begin with that of the
+    folder. Hidden files and folders are left out, and so are links to folders, and the files `leave_out`.
+    Raises FormatError for a folder that cannot be listed, and if two files have the same name.
     """
     suffixes = {suffix for each in formats() if each.carries for suffix in each.suffixes}
     left_out = {os.path.realpath(path) for path in leave_out}
     found: list[Source] = []
     for folder in folders:
+        if isinstance(folder, RemotePath):
+            found += _find_elsewhere(folder, suffixes, f"{folder.name}/" if len(folders) > 1 else "")
+            continue
         prefix = f"{folder.resolve().name}/" if len(folders) > 1 and folder.is_dir() else ""
         root = folder if folder.is_dir() else folder.parent
         files = sorted(_files(folder)) if folder.is_dir() else [folder]
@@ -65,6 +69,28 @@ def find_sources(folders: Sequence[Path], *, leave_out: Sequence[Path] = ()) -> 
     if twice:
         raise FormatError(f"{twice[0]} is there twice: two of the given folders have the same name and files")
     return sorted(found, key=lambda one: one.name)
+
+
+def _find_elsewhere(folder: RemotePath, suffixes: set[str], prefix: str) -> list[Source]:
+    """Return the files in and below a folder elsewhere."""
+    names = [name for name in folder.walk() if not any(part.startswith(".") for part in name.split("/"))]
+    if len(names) > MOST_FILES:
+        raise FormatError(f"holds more than {MOST_FILES} files; give parts of it", path=folder)
+    present = set(names)
+    found = []
+    for name in sorted(names):
+        path = PurePosixPath(name)
+        if path.suffix.lower() in suffixes:
+            beside = (path.with_suffix(suffix).as_posix() for suffix in SOUNDS)
+            sound = next((one for one in beside if one in present), None)
+            found.append(
+                Source(
+                    folder / name, prefix + name, prefix + path.with_suffix("").as_posix(),
+                    sound=None if sound is None else folder / sound,
+                    sound_name=None if sound is None else prefix + sound,
+                )
+            )  # fmt: skip
+    return found
 
 
 def _files(folder: Path) -> Iterator[Path]:

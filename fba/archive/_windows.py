@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Sequence
+from bisect import bisect_right
+from collections import OrderedDict
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal, get_args
@@ -14,14 +16,18 @@ from fba.animation import Animation
 from fba.archive._performance import Performance
 from fba.archive._shards import Archive, Place
 from fba.arrays import Float32, Int32, Int64
-from fba.capture import to_blendshapes
+from fba.capture import shown_weights
 from fba.errors import FormatError, OptionError, did_you_mean
-from fba.face import Deformer, FaceModel, arkit_names, feature_point_names, resolve, shown_faps
+from fba.face import Deformer, FaceModel, arkit_names, feature_point_names, resolve
 from fba.parameters import BAP_COUNT, bap_numbers, fap_numbers
 from fba.tracks import hold
 
 Kind = Literal["faps", "arkit", "points", "baps", "joints"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+MOST_FRAMES = 4096
+"""Longest part of a performance that is kept as one."""
+KEPT_BYTES = 64 << 20
+"""Bytes of frames that `Windows` keeps by default: two hours of FAPs."""
 _FACE: tuple[Kind, ...] = ("faps", "arkit", "points")
 
 
@@ -36,7 +42,7 @@ class Windows(Sequence[Float32]):
     as_: what a window is.
         "faps": (frames, 68), the FAPs that a face shows, in FAPU as the standard has them
             (`fba.face.resolve`); the first two are 0.
-        "arkit": (frames, 52), weights of ARKit's shapes, 0 to 1 (`fba.capture.to_blendshapes` of the window).
+        "arkit": (frames, 52), weights of ARKit's shapes, 0 to 1 (`fba.capture.to_blendshapes`).
         "points": (frames, 84, 3), feature points of the built-in head in metres, turned with it; x to its
             left, y up, z ahead (`fba.face.Deformer.feature_points`). NaN for points that it lacks.
         "baps": (frames, 296), the BAPs in force, in 1e-5 rad and mm.
@@ -46,6 +52,8 @@ class Windows(Sequence[Float32]):
         `names` lists those of the windows. rate: frames per second; performances of other rates are
         interpolated (`fba.Animation.resample`). Default: each keeps its rate. performances: names of those to
         use, for example those that a query returns; default: all.
+    keep: bytes of frames to keep, those of the last windows, so that windows that have frames in common, or
+    come again, need not be decoded again; 0 for none. Each process keeps its own.
 
     `windows[i]` decodes from the last I plane before the window, and returns a new array. `describe(i)` says
     whose it is. A `torch.utils.data.DataLoader` takes the object as it is; it pickles, and works in forked
@@ -65,6 +73,7 @@ class Windows(Sequence[Float32]):
         parameters: Sequence[str | int] | None = None,
         rate: Fraction | float | str | None = None,
         performances: Collection[str] | None = None,
+        keep: int = KEPT_BYTES,
     ) -> None:
         stride = frames if stride is None else stride
         for name, value in (("frames", frames), ("stride", stride)):
@@ -77,6 +86,11 @@ class Windows(Sequence[Float32]):
         self.rate = None if rate is None else Fraction(rate)
         if self.rate is not None and self.rate <= 0:
             raise OptionError(f"the rate must be positive, not {rate}")
+        if not isinstance(keep, int | np.integer) or keep < 0:
+            raise OptionError(f"keep must be a number of bytes, 0 or more, not {keep!r}")
+        self.keep = int(keep)
+        self._parts: OrderedDict[tuple[Place, int], Float32] = OrderedDict()
+        self._size = 0
         self.archive = Archive(folder)
         self._converter = _Converter(as_, parameters)
         self._places, counts = self._find(None if performances is None else set(performances))
@@ -99,13 +113,24 @@ class Windows(Sequence[Float32]):
         """Return a window: float32 (frames, columns) or (frames, columns, 3). A slice gives a list."""
         if isinstance(position, slice):
             return [self[one] for one in range(*position.indices(len(self)))]
-        performance, first = self._locate(position)
-        return self._converter.convert(self._decode(performance, first), performance)
+        place, first = self._locate(position)
+        performance = self._performance(place)
+        parts = list(self._find_parts(performance, first))
+        rows = self._rows(place, performance, parts)
+        cut = [
+            row[max(first - at, 0) : first + self.frames - at]
+            for (at, _), row in zip(parts, rows, strict=True)
+        ]
+        return np.concatenate(cut)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_parts": OrderedDict(), "_size": 0}
 
     def describe(self, position: int) -> dict[str, Any]:
         """Return whose window it is: name, subject, labels, sound_name; first frame, seconds at which it
         begins, and frames per second."""
-        performance, first = self._locate(position)
+        place, first = self._locate(position)
+        performance = self._performance(place)
         rate = self.rate or performance.rate
         return {
             "name": performance.name, "subject": performance.subject, "labels": dict(performance.labels),
@@ -139,18 +164,51 @@ class Windows(Sequence[Float32]):
                 return 1  # reading it raises the error that says what is wrong
         return (frames - self.frames) // self.stride + 1 if frames >= self.frames else 0
 
-    def _locate(self, position: int) -> tuple[Performance, int]:
-        """Return the performance of a window, and its first frame."""
+    def _locate(self, position: int) -> tuple[Place, int]:
+        """Return the place of the performance of a window, and its first frame."""
         at = range(len(self))[position]  # turns negative positions, raises IndexError outside
         number = int(np.searchsorted(self._ends, at, side="right"))
         before = int(self._ends[number - 1]) if number else 0
-        place = self._places[number]
-        performance = self.archive.group(place.shard, place.group)[place.row]
-        return performance, (at - before) * self.stride
+        return self._places[number], (at - before) * self.stride
 
-    def _decode(self, performance: Performance, first: int) -> tuple[Animation, slice]:
-        """Return frames without gaps, from an I plane on, and which of them are the window."""
-        last = first + self.frames - 1
+    def _performance(self, place: Place) -> Performance:
+        return self.archive.group(place.shard, place.group)[place.row]
+
+    def _find_parts(self, performance: Performance, first: int) -> Iterator[tuple[int, int]]:
+        """Yield the first frame, and that behind the last, of each part of a performance in a window.
+
+        Parts begin at I planes, and after MOST_FRAMES.
+        """
+        own, rate = performance.rate, self.rate or performance.rate
+        starts = [_frame_at(start, own, rate) for start in performance.start_frames]
+        end = (performance.frames - 1) * rate // own + 1
+        frame = first
+        while frame < first + self.frames:
+            number = bisect_right(starts, frame)
+            begin = frame - (frame - starts[number - 1]) % MOST_FRAMES
+            frame = min(begin + MOST_FRAMES, starts[number] if number < len(starts) else end)
+            yield begin, frame
+
+    def _rows(
+        self, place: Place, performance: Performance, parts: Sequence[tuple[int, int]]
+    ) -> list[Float32]:
+        """Return the columns of each of these parts of a performance; what is not kept is decoded at once."""
+        rows = {at: self._parts[place, at] for at, _ in parts if (place, at) in self._parts}
+        missing = [part for part in parts if part[0] not in rows]
+        if missing:
+            begin, last = missing[0][0], missing[-1][1] - 1
+            decoded = self._converter.convert(self._decode(performance, begin, last), performance)
+            for at, end in missing:
+                rows[at] = self._parts[place, at] = decoded[at - begin : end - begin].copy()
+                self._size += rows[at].nbytes
+        for at, _ in parts:
+            self._parts.move_to_end((place, at))
+        while self._size > self.keep:
+            self._size -= self._parts.popitem(last=False)[1].nbytes
+        return [rows[at] for at, _ in parts]
+
+    def _decode(self, performance: Performance, first: int, last: int) -> tuple[Animation, slice]:
+        """Return frames without gaps, from an I plane on, and which of them are those from first to last."""
         if self.rate is None or self.rate == performance.rate:
             part = performance.decode_frames(first, last)
             if len(part) != int(part.index[-1] - part.index[0]) + 1:
@@ -161,7 +219,12 @@ class Windows(Sequence[Float32]):
             begin = first * ratio.numerator // ratio.denominator
             part = performance.decode_frames(begin, end).resample(self.rate)
         at = first - int(part.index[0])
-        return part, slice(at, at + self.frames)
+        return part, slice(at, at + last - first + 1)
+
+
+def _frame_at(frame: int, own: Fraction, rate: Fraction) -> int:
+    """Return the first frame at a rate that does not come before this one at a performance's rate."""
+    return -int(-frame * rate // own)
 
 
 @dataclass(frozen=True)
@@ -185,23 +248,20 @@ class _Converter:
         return {**self.__dict__, "_tool": None}
 
     def convert(self, decoded: tuple[Animation, slice], performance: Performance) -> Float32:
-        """Return a window. decoded: frames, and which of them are the window."""
+        """Return columns of frames. decoded: frames, and which of them are wanted."""
         part, window = decoded
         track = part.face if self._kind in _FACE else part.body
         if track is None or window.start < 0 or window.stop > len(part):
             raise FormatError(f"{performance.name}: the stream does not hold what its row says")
         values = np.asarray(getattr(self, f"_{self._kind}")(part, window))
-        result = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
-        return result if result.base is None else result.copy()
+        return np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
 
     def _faps(self, part: Animation, window: slice) -> Float32:
         assert part.face is not None
         return resolve(part.face)[window]
 
     def _arkit(self, part: Animation, window: slice) -> Any:
-        assert part.face is not None
-        shown = shown_faps(part.face)[window]  # what came before the window is in force in it
-        return to_blendshapes(Animation(part.rate, part.index[window], shown)).weights
+        return shown_weights(self._faps(part, window).astype(np.float64))
 
     def _points(self, part: Animation, window: slice) -> Any:
         if self._tool is None:

@@ -13,6 +13,7 @@ from fba.capture.blendshapes import (
     from_action_units,
     from_blendshapes,
     shape_faps,
+    shown_weights,
     to_blendshapes,
 )
 from fba.capture.markers._faces import from_markers
@@ -43,5 +44,6 @@ __all__ = [
     "retarget_motion",
     "retarget_report",
     "shape_faps",
+    "shown_weights",
     "to_blendshapes",
 ]

@@ -12,11 +12,11 @@ import pytest
 
 import archived
 import fba
-from fba.archive import KINDS, Archive, Coding, Windows
+from fba.archive import KINDS, Archive, Coding, Performance, Windows
 from fba.body import BapSolver, Skeleton
 from fba.capture import to_blendshapes
 from fba.errors import FormatError, OptionError
-from fba.face import Deformer, FaceModel, arkit_names, resolve, shown_faps
+from fba.face import Deformer, FaceModel, arkit_names, resolve
 from fba.parameters import BAP_COUNT
 from fba.tracks import hold
 
@@ -51,14 +51,43 @@ def test_windows_are_parts_of_whole_performances(archive: Path, kind: Any) -> No
 
 
 def test_weights_of_windows(archive: Path) -> None:
-    """Visemes and held FAPs from before the window count; the weights are those of the window alone."""
+    """Visemes and held FAPs from before the window count: the weights are those of the performance."""
     windows = Windows(archive, 60, 99, as_="arkit")
-    wholes = {one.name: one.decode() for one in Archive(archive)}
+    wholes = {one.name: to_blendshapes(one.decode()).weights for one in Archive(archive) if one.face}
     for position, window in enumerate(windows):
         about = windows.describe(position)
-        shown = shown_faps(archived.face_of(wholes[about["name"]]))[about["frame"] : about["frame"] + 60]
-        weights = to_blendshapes(fba.Animation(25, np.arange(60), shown)).weights
-        np.testing.assert_array_equal(window, weights.astype(np.float32))
+        weights = wholes[about["name"]][about["frame"] : about["frame"] + 60]
+        np.testing.assert_allclose(window, weights, atol=1e-7)
+
+
+@pytest.mark.parametrize("as_", ["faps", "joints"])
+@pytest.mark.parametrize("rate", [None, 60, 12])
+def test_windows_are_the_same_however_much_is_kept(
+    archive: Path, monkeypatch: pytest.MonkeyPatch, as_: str, rate: int | None
+) -> None:
+    monkeypatch.setattr("fba.archive._windows.MOST_FRAMES", 37)  # parts end between I planes too
+    kept = Windows(archive, 60, 7, as_=as_, rate=rate)
+    none = Windows(archive, 60, 7, as_=as_, rate=rate, keep=0)
+    few = Windows(archive, 60, 7, as_=as_, rate=rate, keep=100_000)
+    order = np.random.default_rng(0).permutation(len(kept))
+    for position in [*order, *order[:20]]:
+        window = kept[position]
+        np.testing.assert_array_equal(window, none[position])
+        np.testing.assert_array_equal(window, few[position])
+        window[:] = -1  # what the caller does with a window does not change those that are kept
+    assert none._size == 0 < few._size <= 100_000 < kept._size
+    assert few._size == sum(part.nbytes for part in few._parts.values())
+    assert len(pickle.dumps(kept)) < 20_000
+
+
+def test_kept_frames_are_not_decoded_again(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    windows = Windows(archive, 60, 30)
+    first = [windows[position] for position in range(len(windows))]
+    monkeypatch.setattr(Performance, "decode_frames", None)
+    for position, window in enumerate(first):
+        np.testing.assert_array_equal(windows[position], window)
+    with pytest.raises(OptionError, match="keep must be a number of bytes"):
+        Windows(archive, 60, keep=-1)
 
 
 def test_every_window_and_its_owner(archive: Path) -> None:

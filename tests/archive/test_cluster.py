@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import shutil
 import signal
@@ -17,7 +18,7 @@ import pytest
 
 pytest.importorskip("distributed")
 
-from fba.archive import Outcome, for_each_on
+from fba.archive import RECORD, Outcome, for_each_on
 from fba.archive import _cluster as cluster
 from fba.errors import FbaError, OptionError
 from ready_programs import BIN
@@ -148,6 +149,43 @@ def test_a_folder_converted_on_a_cluster(tmp_path: Path) -> None:
     assert "30 converted, 0 there before, 1 failed" in first.stdout, first.stderr
     assert "0 converted, 30 there before, 1 failed" in again.stdout
     assert len({path.read_bytes() for path in out.glob("*.fba")}) == 1
+
+
+@pytest.mark.parametrize("stopped", ["Ctrl-C", "the scheduler ends"])
+def test_what_a_stopped_batch_has_recorded_is_not_converted_again(tmp_path: Path, stopped: str) -> None:
+    captures, out = tmp_path / "captures", tmp_path / "out"
+    captures.mkdir()
+    for number in range(3 * cluster.CHUNK):
+        shutil.copy(SAMPLES / "hello.fap", captures / f"{number:03}.fap")
+    command = [BIN / "fba", "convert", "--batch", captures, out, "--to", "fba", "--scheduler"]
+    with started(1, tmp_path) as (address, scheduler, _):
+        first = subprocess.Popen([*command, address], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        while len(recorded(out)) < cluster.CHUNK:
+            assert first.poll() is None
+            time.sleep(0.02)
+        if stopped == "Ctrl-C":
+            first.send_signal(signal.SIGINT)
+        else:
+            end(scheduler)
+        _, said = first.communicate()
+    assert first.returncode == (130 if stopped == "Ctrl-C" else 1), said
+    done = recorded(out)
+    assert cluster.CHUNK <= len(done) < 3 * cluster.CHUNK
+    times = {name: (out / name).stat().st_mtime_ns for name in done}
+    with started(1, tmp_path) as (address, _, _):
+        again = subprocess.run([*command, address], capture_output=True, text=True, check=False)
+    rest = 3 * cluster.CHUNK - len(done)
+    assert f"{rest} converted, {len(done)} there before, 0 failed" in again.stdout, again.stderr
+    assert {name: (out / name).stat().st_mtime_ns for name in done} == times
+    assert len(recorded(out)) == 3 * cluster.CHUNK
+
+
+def recorded(folder: Path) -> list[str]:
+    """Return the names of the results that a table of conversions lists; a line may be half written."""
+    if not (folder / RECORD).exists():
+        return []
+    rows = list(csv.reader((folder / RECORD).read_text().splitlines()[1:]))
+    return [row[1] for row in rows if len(row) == 6]
 
 
 def test_addresses_without_a_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,7 @@
 May use: parameters, the face, and what `fba.capture` says of times.
 """
 
-from fba.capture.blendshapes._inversion import to_blendshapes
+from fba.capture.blendshapes._inversion import shown_weights, to_blendshapes
 from fba.capture.blendshapes._motion import ActionUnitMotion, ShapeMotion
 from fba.capture.blendshapes.action_units import from_action_units
 from fba.capture.blendshapes.conversion import from_blendshapes
@@ -15,5 +15,6 @@ __all__ = [
     "from_action_units",
     "from_blendshapes",
     "shape_faps",
+    "shown_weights",
     "to_blendshapes",
 ]

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Float64
+from fba.arrays import Bool, Float64, Int64
 from fba.capture.blendshapes._motion import ShapeMotion
 from fba.capture.blendshapes.combination import CLOSED, JAW, RADIAN
 from fba.capture.blendshapes.conversion import EYE_FAPS, HEAD_FAPS
@@ -20,10 +20,10 @@ from fba.parameters import FAP_COUNT, fap_numbers, faps
 
 EYEBALL_RADIUS = 0.012
 """Radius of an eyeball, in metres: a turn of one radian moves the pupil this far."""
-MAX_SWEEPS = 200
-"""Largest number of sweeps, in each of which every weight is set to its best value for the others."""
-MAX_CHANGE = 1e-4
-"""The sweeps end when no weight changes by more than this."""
+SETTLED = 1e-9
+"""Change that a weight must be worth to leave a bound."""
+MAX_CHANGES = 100
+"""Most changes of the set of free weights in a frame, for each weight; a first frame needs one or two."""
 SHARED_WEIGHT = 5e-4
 """Metres of error that count as much as a weight of 1. It divides a movement among shapes that are nearly
 alike, as real faces do, and keeps shapes out of movements too small to see."""
@@ -44,18 +44,30 @@ def to_blendshapes(animation: Animation, names: tuple[str, ...] | None = None) -
     if animation.face is None or not len(animation):
         raise ModelError("the animation has no face; there is nothing to make blendshapes of")
     shown = resolve(animation.face).astype(np.float64)
-    shapes = _shapes(names)
-    products = shapes @ shapes.T + SHARED_WEIGHT**2 * np.eye(len(shapes))
-    weights = find_weights(products, (shown * _metres(names)) @ shapes.T, MAX_SWEEPS, MAX_CHANGE)
-    if {JAW, CLOSED} <= set(names):
-        opened, closed = names.index(JAW), names.index(CLOSED)
-        weights[:, opened] = np.minimum(weights[:, opened] + weights[:, closed], 1.0)
+    weights = shown_weights(shown, names)
     times = np.asarray(animation.index, dtype=np.float64) / float(animation.rate)
     return ShapeMotion(
         names, weights, times - times[0], Fraction(animation.rate),
         head=_angles(shown, HEAD_FAPS), eyes=_angles(shown, EYE_FAPS), start=float(times[0]),
         name=animation.name,
     )  # fmt: skip
+
+
+def shown_weights(shown: Float64, names: tuple[str, ...] | None = None) -> Float64:
+    """Return the weights (T, N) of `to_blendshapes` for FAPs (T, 68) that a face shows (`fba.face.resolve`).
+
+    Each frame has its weights whatever the others show. Raises ModelError for a shape whose FAPs are not
+    known.
+    """
+    names = arkit_names() if names is None else names
+    shapes = _shapes(names)
+    products = shapes @ shapes.T + SHARED_WEIGHT**2 * np.eye(len(shapes))
+    # By einsum: at this size the threads of a BLAS cost more than they save.
+    weights = find_weights(products, np.einsum("tf,nf->tn", shown, shapes * _metres(names)))
+    if {JAW, CLOSED} <= set(names):
+        opened, closed = names.index(JAW), names.index(CLOSED)
+        weights[:, opened] = np.minimum(weights[:, opened] + weights[:, closed], 1.0)
+    return weights
 
 
 @cache
@@ -93,37 +105,114 @@ def _angles(shown: Float64, names: tuple[str, ...]) -> Float64:
 
 
 @compiled
-def find_weights(products: Float64, goals: Float64, sweeps: int, settled: float) -> Float64:
-    """Turn goals (T, N) into weights (T, N) of 0 to 1 that solve least squares; return them.
+def find_weights(products: Float64, goals: Float64) -> Float64:
+    """Turn goals (T, N) into the weights (T, N) of 0 to 1 that solve least squares; return them.
 
-    products: (N, N), of all shapes with each other, symmetric. goals: products of what is wanted with each
-    shape. Each weight in turn is set to its best value for the others, up to `sweeps` times, until none
-    changes by more than `settled`. A frame starts from the weights of the frame before.
+    products: (N, N), of all shapes with each other, symmetric, positive definite. goals: products of what is
+    wanted with each shape.
+
+    An active set: weights between the bounds are free, and solve their normal equations. On the way there,
+    the one that meets a bound first stops there; once all are there, the one at a bound that is most worth
+    moving becomes free, until none is worth SETTLED. The error falls with each, so that no set comes twice.
+    A frame begins with the weights and the set of the frame before, of which it mostly needs little else.
 
     Bounds: indices run over the shape of goals, the array that is written; products is checked against it.
     """
     frames, shapes = goals.shape
     if products.shape[0] < shapes or products.shape[1] < shapes:
         raise IndexError("fewer products than shapes")
+    weights = np.zeros(shapes)
+    free = np.zeros(shapes, np.int64)  # the first `count`: free weights, in the order of the factor's rows
+    count = 0
+    is_free = np.zeros(shapes, np.bool_)
+    factor = np.zeros((shapes, shapes))
+    best = np.zeros(shapes)
+    rest = np.zeros(shapes)
     for frame in range(frames):
-        rest = goals[frame].copy()  # what is wanted, less what the weights give
-        weights = goals[frame]
-        for shape in range(shapes):
-            weights[shape] = goals[frame - 1, shape] if frame else 0.0
-            if weights[shape] != 0.0:
-                for other in range(shapes):
-                    rest[other] -= products[shape, other] * weights[shape]
-        for _ in range(sweeps):
-            change = 0.0
+        goal = goals[frame]
+        for _ in range(MAX_CHANGES * shapes):
+            _solve_free(products, goal, weights, free, count, is_free, factor, best)
+            share, place, bound = 1.0, -1, 0.0
+            for row in range(count):
+                old, new = weights[free[row]], best[row]
+                if new < 0.0 and old < share * (old - new):
+                    share, place, bound = old / (old - new), row, 0.0
+                elif new > 1.0 and 1.0 - old < share * (new - old):
+                    share, place, bound = (1.0 - old) / (new - old), row, 1.0
+            for row in range(count):
+                old = weights[free[row]]
+                weights[free[row]] = best[row] if place < 0 else old + share * (best[row] - old)
+            if place >= 0:
+                weights[free[place]] = bound
+                is_free[free[place]] = False
+                count -= 1
+                for row in range(place, count):
+                    free[row] = free[row + 1]
+                _factor_rows(products, free, place, count, factor)
+                continue
+            rest[:] = goal
             for shape in range(shapes):
-                better = weights[shape] + rest[shape] / products[shape, shape]
-                better = min(max(better, 0.0), 1.0)
-                moved = better - weights[shape]
-                if moved != 0.0:  # most weights rest at 0
-                    change = max(change, abs(moved))
-                    weights[shape] = better
+                if weights[shape] != 0.0:
                     for other in range(shapes):
-                        rest[other] -= products[shape, other] * moved
-            if change < settled:
+                        rest[other] -= products[shape, other] * weights[shape]
+            most, better = SETTLED, -1
+            for shape in range(shapes):
+                if not is_free[shape]:
+                    change = rest[shape] / products[shape, shape]
+                    change = -change if weights[shape] == 1.0 else change
+                    if change > most:
+                        most, better = change, shape
+            if better < 0:
                 break
+            free[count] = better
+            is_free[better] = True
+            count += 1
+            _factor_rows(products, free, count - 1, count, factor)
+        for shape in range(shapes):
+            goal[shape] = min(max(weights[shape], 0.0), 1.0)
     return goals
+
+
+@compiled
+def _factor_rows(products: Float64, free: Int64, first: int, count: int, factor: Float64) -> None:
+    """Compute rows `first` to `count` of the Cholesky factor of the products of the free weights.
+
+    Bounds: rows are at most the number of shapes, by which the caller sizes all arrays.
+    """
+    for row in range(first, count):
+        for column in range(row + 1):
+            rest = products[free[row], free[column]]
+            for k in range(column):
+                rest -= factor[row, k] * factor[column, k]
+            factor[row, column] = np.sqrt(rest) if row == column else rest / factor[column, column]
+
+
+@compiled
+def _solve_free(
+    products: Float64,
+    goal: Float64,
+    weights: Float64,
+    free: Int64,
+    count: int,
+    is_free: Bool,
+    factor: Float64,
+    best: Float64,
+) -> None:
+    """Write the best values of the free weights, without bounds, to `best`, in the order of `free`.
+
+    Bounds: rows are at most the number of shapes, by which the caller sizes all arrays.
+    """
+    for row in range(count):
+        best[row] = goal[free[row]]
+    for shape in range(len(weights)):
+        if weights[shape] != 0.0 and not is_free[shape]:
+            for row in range(count):
+                best[row] -= products[shape, free[row]] * weights[shape]
+    for row in range(count):
+        for k in range(row):
+            best[row] -= factor[row, k] * best[k]
+        best[row] /= factor[row, row]
+    for row in range(count - 1, -1, -1):
+        for k in range(row + 1, count):
+            best[row] -= factor[k, row] * best[k]
+        best[row] /= factor[row, row]

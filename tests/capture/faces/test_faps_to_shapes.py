@@ -11,13 +11,15 @@ from scipy.optimize import lsq_linear
 
 import fba
 from fba.animation import Animation, FaceTrack
-from fba.capture import ShapeMotion, from_blendshapes, to_blendshapes
-from fba.capture.blendshapes._inversion import find_weights
+from fba.arrays import Float64
+from fba.capture import ShapeMotion, from_blendshapes, shown_weights, to_blendshapes
+from fba.capture.blendshapes._inversion import SHARED_WEIGHT, _metres, _shapes, find_weights
 from fba.errors import FbaWarning, FormatError, ModelError
-from fba.face import arkit_names
+from fba.face import arkit_names, resolve
 from fba.formats.face_tables._livelink_csv import read_face
 from fba.parameters import fap_numbers
 
+SAMPLES = Path(fba.__file__).parent / "samples"
 COUNT = 40
 ALIKE = ("mouthDimpleLeft", "mouthDimpleRight", "mouthShrugLower", "mouthPressLeft", "mouthPressRight")
 """Shapes of which others do a part: these come back with them."""
@@ -139,9 +141,45 @@ def test_weights_are_the_least_squares_between_0_and_1() -> None:
     """In plain Python as in machine code, against another solver."""
     random = np.random.default_rng(3)
     matrix, wanted = random.normal(size=(9, 5)), random.normal(size=(4, 9))
-    expected = [lsq_linear(matrix, one, (0, 1)).x for one in wanted]
+    expected = [lsq_linear(matrix, one, (0, 1), method="bvls", tol=1e-14).x for one in wanted]
     loops = {find_weights, getattr(find_weights, "py_func", find_weights)}
     for loop in loops:
-        found = loop(matrix.T @ matrix, wanted @ matrix, 500, 1e-12)
-        np.testing.assert_allclose(found, expected, atol=1e-6)
+        np.testing.assert_allclose(loop(matrix.T @ matrix, wanted @ matrix), expected, atol=1e-9)
     assert (np.array(expected) < 1e-9).any()
+    assert (np.array(expected) > 1 - 1e-9).any()
+    with pytest.raises(IndexError):
+        find_weights(np.eye(3), np.zeros((2, 4)))
+
+
+def distance_from_best(weights: Float64, shown: Float64) -> float:
+    """Return by how much a weight could be set better, the others as they are; 0 only at the optimum."""
+    shapes = _shapes(arkit_names())
+    products = shapes @ shapes.T + SHARED_WEIGHT**2 * np.eye(len(shapes))
+    rest = (shown * _metres(arkit_names())) @ shapes.T - weights @ products
+    better = np.clip(weights + rest / np.diag(products), 0, 1)
+    return float(np.abs(better - weights).max())
+
+
+@pytest.mark.parametrize("source", ["sample", "small", "large", "jumps"])
+def test_weights_of_shapes_are_the_optimum(source: str) -> None:
+    """The problem is strictly convex: where no single weight can be set better, all are the best."""
+    random = np.random.default_rng(5)
+    shown = resolve(fba.read(SAMPLES / "hello.fap").face)[:200].astype(np.float64)
+    if source != "sample":
+        shown = random.normal(0, {"small": 3, "large": 2000, "jumps": 300}[source], (200, 68))
+    if source == "jumps":
+        shown[::2] = 0
+    weights = shown_weights(shown)
+    opened, closed = (arkit_names().index(name) for name in ("jawOpen", "mouthClose"))
+    full = weights[:, opened] >= 1  # there, what jawOpen has of mouthClose is not to be seen
+    weights[:, opened] -= weights[:, closed]
+    assert (~full).sum() > 20
+    assert distance_from_best(weights[~full], shown[~full]) < 1e-8
+    assert distance_from_best(np.clip(weights[~full] + 1e-5, 0, 1), shown[~full]) > 1e-6
+    np.testing.assert_allclose(shown_weights(shown[::-1])[::-1], shown_weights(shown), atol=1e-8)
+
+
+@pytest.mark.parametrize("shape", [(1, 52), (0, 52), (5, 1)])
+def test_few_frames_and_shapes(shape: tuple[int, int]) -> None:
+    found = find_weights(np.eye(shape[1]), np.full(shape, 0.5))
+    np.testing.assert_array_equal(found, np.full(shape, 0.5))

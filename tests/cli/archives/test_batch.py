@@ -9,8 +9,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,7 +40,7 @@ def captures(tmp_path: Path) -> Path:
 def record(folder: Path) -> dict[str, list[str]]:
     with open(folder / RECORD, newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0] == ["source", "output", "key", "bytes", "error"]
+    assert rows[0] == ["source", "output", "key", "bytes", "error", "warnings"]
     return {row[0]: row[1:] for row in rows[1:]}
 
 
@@ -169,6 +171,121 @@ def test_a_table_that_was_cut_off(run: Run, captures: Path, tmp_path: Path) -> N
     table = tmp_path / "out" / RECORD
     table.write_text(table.read_text() + 'turn.bap,"tu')
     assert "0 converted, 2 there before" in run(*arguments)[1]
+
+
+def write_still_heads(folder: Path, count: int) -> None:
+    """Write tables of Live Link whose heads never turn: a warning for each."""
+    talk = fba.read(SAMPLES / "hello.fap")
+    assert talk.face is not None
+    values = talk.face.values.copy()
+    values[:, 22:26] = values[:, 47:50] = 0
+    still = replace(talk, face=replace(talk.face, values=values))
+    folder.mkdir()
+    for number in range(count):
+        fba.write(folder / f"take{number}.csv", still)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_warning_of_many_files_is_said_once(run: Run, tmp_path: Path, jobs: int) -> None:
+    write_still_heads(tmp_path / "in", 5)
+    shutil.copy(SAMPLES / "hello.fap", tmp_path / "in")
+    arguments = ("convert", "--batch", tmp_path / "in", tmp_path / "out", "--to", "fba", "--jobs", jobs)
+    code, _, err = run(*arguments)
+    assert code == 0
+    said = [line for line in err.splitlines() if "all angles of head and eyes are 0" in line]
+    assert len(said) == 2
+    assert said[0].startswith("fba: warning: take0.csv: all angles")
+    assert said[1].startswith("fba: warning: in 4 more files, as conversions.csv lists: all angles")
+    assert str(tmp_path) not in err
+    rows = record(tmp_path / "out")
+    assert all("all angles of head and eyes are 0" in rows[f"take{number}.csv"][4] for number in range(5))
+    assert rows["hello.fap"][4] == ""
+    code, _, err = run(*arguments)  # they are not read again
+    assert (code, err) == (0, "")
+    assert record(tmp_path / "out") == rows
+
+
+@pytest.fixture
+def memory() -> Iterator[Any]:
+    """fsspec's file system in memory, empty before and after."""
+    storage = pytest.importorskip("fsspec").filesystem("memory")
+    storage.store.clear()
+    yield storage
+    storage.store.clear()
+
+
+def test_folders_elsewhere(run: Run, captures: Path, tmp_path: Path, memory: Any) -> None:
+    (captures / ".hidden").mkdir()
+    shutil.copy(SAMPLES / "hello.fap", captures / ".hidden")
+    here = tmp_path / "here"
+    assert run("convert", "--batch", captures, here, "--to", "fba", "--jobs", 1)[0] == 1
+    memory.put(str(captures) + "/", "/far/captures", recursive=True)
+    shutil.make_archive(str(tmp_path / "all"), "zip", captures.parent, captures.name)
+    pairs = [
+        ("memory://far/captures", "memory://far/out"),
+        (captures, "memory://far/other"),
+        (f"zip://captures::{tmp_path}/all.zip", f"file://{tmp_path}/unzipped"),
+        ("memory://far/captures/", tmp_path / "fetched"),
+    ]
+    for source, target in pairs:
+        arguments = ("convert", "--batch", source, target, "--to", "fba", "--jobs", 1)
+        code, printed, err = run(*arguments)
+        assert (code, "2 converted, 0 there before, 2 failed" in printed) == (1, True), err
+        assert "0 converted, 2 there before, 2 failed" in run(*arguments)[1]
+        if "://" in str(source):
+            assert f"{str(source).rstrip('/')}/bad.fap" in " ".join(printed.split()) or "::" in str(source)
+    for found in (
+        {name.removeprefix("/far/out/"): memory.cat(name) for name in memory.find("/far/out")},
+        {name.removeprefix("/far/other/"): memory.cat(name) for name in memory.find("/far/other")},
+        {name: (tmp_path / "unzipped" / name).read_bytes() for name in files(tmp_path / "unzipped")},
+        {name: (tmp_path / "fetched" / name).read_bytes() for name in files(tmp_path / "fetched")},
+    ):
+        assert sorted(found) == files(here)  # and nothing temporary
+        assert {name: data for name, data in found.items() if name != RECORD} == {
+            name: (here / name).read_bytes() for name in files(here) if name != RECORD
+        }
+
+
+def test_processes_read_and_write_elsewhere(run: Run, captures: Path, tmp_path: Path) -> None:
+    pytest.importorskip("fsspec")
+    source, target = f"file://{captures}", f"file://{tmp_path}/out"
+    code, printed, err = run("convert", "--batch", source, target, "--to", "fba", "--jobs", 2)
+    assert code == 1, err
+    assert "2 converted, 0 there before, 2 failed" in printed
+    assert files(tmp_path / "out") == ["anna/hello.fba", RECORD, "turn.fba"]
+    assert f"{source}/bad.fap" in record(tmp_path / "out")["bad.fap"][3]
+
+
+def test_a_storage_that_takes_nothing(
+    run: Run, captures: Path, memory: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A result that cannot be brought is a failure of its file, and leaves nothing."""
+    put = type(memory).put_file
+
+    def fail(self: Any, local: str, remote: str, **more: Any) -> None:
+        if Path(local).suffix == ".fba":
+            raise OSError("the line is dead")
+        put(self, local, remote, **more)
+
+    monkeypatch.setattr(type(memory), "put_file", fail)
+    arguments = ("convert", "--batch", captures, "memory://far/out", "--to", "fba", "--jobs", 1)
+    code, printed, _ = run(*arguments)
+    assert (code, "0 converted, 0 there before, 4 failed" in printed) == (1, True)
+    assert "could not be written: the line is dead" in " ".join(printed.split())
+    assert [name.rpartition("/")[2] for name in memory.find("/far/out")] == [RECORD]
+    monkeypatch.undo()
+    assert "2 converted, 0 there before, 2 failed" in run(*arguments)[1]
+
+
+def test_addresses_that_contain_each_other(run: Run, captures: Path, memory: Any) -> None:
+    memory.put(str(captures) + "/", "/far/captures", recursive=True)
+    for target in ("memory://far/captures", "memory://far/captures/out"):
+        code, _, err = run("convert", "--batch", "memory://far/captures", target, "--to", "fba")
+        assert code == 2
+        assert "neither of them in the other" in " ".join(err.split())
+    code, _, err = run("convert", "--batch", "nowhere://a", "memory://far/out", "--to", "fba")
+    assert code != 0
+    assert "Protocol not known" in err
 
 
 def test_a_folder_without_anything_to_read(run: Run, tmp_path: Path) -> None:

@@ -4,8 +4,10 @@ import { CLOSED, JAW, METRES, SHAPES, SHARED_WEIGHT } from "./shapes.js";
 /** @type {Record<string, string>} */
 const SIDES = { l: "left", r: "right", lft: "left", rgt: "right" };
 const MOST_COMMON_WORDS = 4;
-const MOST_SWEEPS = 200;
-const SETTLED = 1e-4;
+/** Most changes of the set of free weights in a frame, for each weight. */
+const MOST_CHANGES = 100;
+/** Change that a weight must be worth to leave a bound. */
+const SETTLED = 1e-9;
 const FAPS = METRES.length;
 
 /** ARKit's names by their words. @type {Map<string, string>} */
@@ -48,26 +50,76 @@ export class ShapeWeights {
     /** The last weights, 0 to 1, of `names`. */
     this.weights = new Float64Array(this.names.length);
     this._shown = new Float64Array(this.names.length);
+    /** Weights between the bounds, and the rows of the Cholesky factor of their products. @type {number[]} */
+    this._free = [];
+    /** @type {Float64Array[]} */
+    this._factor = this.names.map(() => new Float64Array(this.names.length));
   }
 
   /** Return the weights for FAPs 1 to 68, visemes and expressions resolved. @param {ArrayLike<number>} faps */
   of(faps) {
     const moved = Float64Array.from(METRES, (metres, k) => faps[k] * metres);
     const goals = this._rows.map((row) => product(row, moved));
-    const { weights, _products: products } = this;
-    for (let sweep = 0, change = 1; sweep < MOST_SWEEPS && change >= SETTLED; sweep += 1) {
-      change = 0;
-      for (let k = 0; k < weights.length; k += 1) {
-        const rest = goals[k] - product(products[k], weights);
-        const better = Math.min(Math.max(weights[k] + rest / products[k][k], 0), 1);
-        change = Math.max(change, Math.abs(better - weights[k]));
-        weights[k] = better;
+    const { weights, _free: free, _products: products } = this;
+    // An active set, begun with that of the frame before: free weights solve their normal equations; the first that meets a bound
+    // on the way stops there; once all are there, that at a bound which is most worth moving becomes free.
+    for (let change = 0; change < MOST_CHANGES * weights.length; change += 1) {
+      const best = this._solve(goals);
+      let [share, place, bound] = [1, -1, 0];
+      best.forEach((value, row) => {
+        const old = weights[free[row]];
+        const end = value < 0 ? 0 : 1;
+        if ((value < 0 || value > 1) && (end - old) / (value - old) < share) [share, place, bound] = [(end - old) / (value - old), row, end];
+      });
+      best.forEach((value, row) => (weights[free[row]] = place < 0 ? value : weights[free[row]] + share * (value - weights[free[row]])));
+      if (place >= 0) {
+        weights[free[place]] = bound;
+        free.splice(place, 1);
+        this._factorRows(place);
+        continue;
       }
+      let [most, better] = [SETTLED, -1];
+      for (let k = 0; k < weights.length; k += 1) {
+        if (free.includes(k)) continue;
+        const worth = ((goals[k] - product(products[k], weights)) / products[k][k]) * (weights[k] === 1 ? -1 : 1);
+        if (worth > most) [most, better] = [worth, k];
+      }
+      if (better < 0) break;
+      free.push(better);
+      this._factorRows(free.length - 1);
     }
     this._shown.set(weights);
     const [jaw, closed] = [this.names.indexOf(JAW), this.names.indexOf(CLOSED)];
     if (jaw >= 0 && closed >= 0) this._shown[jaw] = Math.min(weights[jaw] + weights[closed], 1);
     return this._shown;
+  }
+
+  /** Return the best values of the free weights, without bounds. @param {number[]} goals */
+  _solve(goals) {
+    const { weights, _free: free, _products: products, _factor: factor } = this;
+    const bound = weights.map((weight, k) => (free.includes(k) ? 0 : weight));
+    const best = free.map((k) => goals[k] - product(products[k], bound));
+    for (let row = 0; row < best.length; row += 1) {
+      for (let k = 0; k < row; k += 1) best[row] -= factor[row][k] * best[k];
+      best[row] /= factor[row][row];
+    }
+    for (let row = best.length - 1; row >= 0; row -= 1) {
+      for (let k = row + 1; k < best.length; k += 1) best[row] -= factor[k][row] * best[k];
+      best[row] /= factor[row][row];
+    }
+    return best;
+  }
+
+  /** Compute rows of the Cholesky factor of the products of the free weights. @param {number} first */
+  _factorRows(first) {
+    const { _free: free, _products: products, _factor: factor } = this;
+    for (let row = first; row < free.length; row += 1) {
+      for (let column = 0; column <= row; column += 1) {
+        let rest = products[free[row]][free[column]];
+        for (let k = 0; k < column; k += 1) rest -= factor[row][k] * factor[column][k];
+        factor[row][column] = row === column ? Math.sqrt(rest) : rest / factor[column][column];
+      }
+    }
   }
 }
 
