@@ -7,7 +7,7 @@ anew, by least squares, so that the simplified face moves as nearly as it can li
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,7 +18,7 @@ from fba.errors import ModelError
 from fba.face._tables import FaceDefMesh, FaceDefTables, interval_lengths
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
-from fba.face.model import DetailLevel, FaceModel, Part
+from fba.face.model import DetailLevel, FaceModel, Part, shape_key
 from fba.mesh.simplify import Level, Simplification, place_on_level, simplify
 from fba.parameters import FAP_COUNT, faps
 
@@ -86,16 +86,20 @@ class FaceSimplification:
     def error(self, level: Level) -> float:
         """Return the distance (m) within which 99 % of the full face's vertices are of a level, in the worst
         pose."""
+        return max(self._errors(level, lambda away: float(np.percentile(away, PERCENT))))
+
+    def _errors(self, level: Level, sum_up: Callable[[Float64], float]) -> list[float]:
+        """Return, for each pose, a number for the distances (V,) of the full face's vertices from a level."""
         rows, weights = place_on_level(self.mesh.positions, level)
         errors = []
         for pose in self.poses:
             moved = level.positions + level.carry(pose - self.poses[0])
             off = np.einsum("nk,nkd->nd", weights, moved[rows]) - pose
-            errors.append(float(np.percentile(np.linalg.norm(off, axis=1), PERCENT)))
-        return max(errors)
+            errors.append(sum_up(np.linalg.norm(off, axis=1)))
+        return errors
 
-    def build(self, level: Level) -> DetailLevel:
-        """Return the face of a level of the mesh, with all that it carries."""
+    def build(self, level: Level, *, tables: bool = True) -> DetailLevel:
+        """Return the face of a level of the mesh, with all that it carries. tables: whether with those."""
         model = self.model
         counts = [len(part.vertices) for part in model.parts]
         owner = np.repeat(np.arange(len(counts)), counts)[level.rows[:, 0]]
@@ -109,10 +113,12 @@ class FaceSimplification:
             model,
             parts=parts,
             bound=bound.astype(np.int32),
-            tables=_fit_tables(model, level, starts, self._pinned, self.mesh.positions),
+            tables=_fit_tables(model, level, starts, self._pinned, self.mesh.positions) if tables else (),
             levels=(),
         )
-        return DetailLevel(face, level.parents)
+        return DetailLevel(
+            face, level.parents, max(self._errors(level, _root_mean_square)), shape_key(model.parts)
+        )
 
     def _part(self, part: Part, level: Level, rows: slice) -> Part:
         model = self.model
@@ -182,6 +188,10 @@ def level_sizes(model: FaceModel, count: int) -> list[int]:
     total, least = len(model.triangles), LEAST_PER_PART * len(model.parts)
     first, *others = (round(total * LEVEL_RATIO**number) for number in range(1, count + 1))
     return [max(first, len(model.parts)), *(faces for faces in others if faces >= least)]
+
+
+def _root_mean_square(away: Float64) -> float:
+    return float(np.sqrt((away**2).mean()))
 
 
 def _values(pose: dict[int, int]) -> Float32:

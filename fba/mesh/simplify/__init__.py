@@ -3,8 +3,8 @@
 from fba.mesh.simplify._memoryless import (
     Level,
     Simplification,
+    place_on_full,
     place_on_level,
-    place_on_triangles,
     simplify,
 )
 from fba.mesh.simplify._quadrics import TOLERANCES, DetailLevels, simplify_by_quadrics
@@ -14,8 +14,8 @@ __all__ = [
     "DetailLevels",
     "Level",
     "Simplification",
+    "place_on_full",
     "place_on_level",
-    "place_on_triangles",
     "simplify",
     "simplify_by_quadrics",
 ]
