@@ -15,8 +15,8 @@ from fba.face import FaceModel, Material, Part
 from fba.face.simplification import level_sizes, simplify_face
 
 BUILTIN = Path(__file__).parents[2] / "fba" / "face" / "builtin"
-COUNT = 4
-"""Levels, unless the last ones have too few triangles for their parts."""
+COUNT = 2
+"""Levels; a third would save little and let the neck show through the shirt."""
 
 
 def make_levels() -> FaceModel:

@@ -7,6 +7,7 @@ from fba.mesh.simplify._memoryless import (
     place_on_level,
     simplify,
 )
+from fba.mesh.simplify._parts import carry_parts, part_looks, part_starts
 from fba.mesh.simplify._quadrics import TOLERANCES, DetailLevels, simplify_by_quadrics
 
 __all__ = [
@@ -14,6 +15,9 @@ __all__ = [
     "DetailLevels",
     "Level",
     "Simplification",
+    "carry_parts",
+    "part_looks",
+    "part_starts",
     "place_on_full",
     "place_on_level",
     "simplify",

@@ -16,7 +16,7 @@ from fba_player.view._view import FaceMesh, FaceShape
 
 MAX_ERROR_PIXELS = 1.3
 """Largest error of a coarser mesh of a body, in pixels."""
-MAX_FACE_ERROR_PIXELS = 1.0
+MAX_FACE_ERROR_PIXELS = 0.8
 """Largest root-mean-square error of a face's level of detail, in pixels."""
 MORPH_SECONDS = 0.5
 """Seconds in which the vertices of a face move from one level of detail to another."""
@@ -111,9 +111,9 @@ class Details:
         if fine:
             parents = parents[levels[fine - 1].first]
         one, other = self._carry(mesh, fine, away), self._carry(mesh, coarse, away)
-        share = np.float32(share if goal == coarse else 1 - share)
+        moved = np.float32(share if goal == coarse else 1 - share)
         arrays = [
-            before + share * (after[parents] - before)
+            before + moved * (after[parents] - before)
             for before, after in (
                 (one.positions, other.positions),
                 (one.normals, other.normals),
