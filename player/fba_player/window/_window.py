@@ -307,7 +307,7 @@ class Window(Closing):
         self.captures.begin_picture()
         time = self.transport.time
         self._target.begin()
-        gradual = self._last if session.recording is None else None  # films do not depend on a clock
+        gradual = wall.perf_counter() if session.recording is None else None  # films need no clock
         within = self._renderer.draw(session.view(time), session.camera(time), size, gradual)
         if self._renderer.morphing:
             self._pictures_due = max(self._pictures_due, 1)
