@@ -41,15 +41,15 @@ def sample() -> Animation:
     return merge(face, body.resample(face.rate))
 
 
-@pytest.fixture(params=["face", "person"])
+@pytest.fixture(params=["face", "person", "eight persons"])
 def shown(request: Any, sample: Animation) -> Iterator[tuple[str, Any]]:
-    from fba.player import Offscreen
+    from fba.player import CompareScene, Offscreen, Scene
 
-    animation = sample
-    if request.param == "face":
-        animation = replace(sample, body=None)
+    subject: Any = replace(sample, body=None) if request.param == "face" else sample
+    if request.param == "eight persons":
+        subject = CompareScene([Scene(sample) for _ in range(8)])
     try:
-        with Offscreen(animation, (1280, 720)) as view:
+        with Offscreen(subject, (1280, 720)) as view:
             yield request.param, view
     except DisplayError as error:
         pytest.skip(str(error))

@@ -42,11 +42,11 @@ fba.carriage
 fba.face.interpolation
 fba.face
 fba.face.deform
-fba.face.simplification
 fba.face.learning
 fba.face.gltf
 fba.face.builtin
 fba.face.authoring.surface
+fba.face.simplification
 fba.face.authoring.regions
 fba.face.authoring._author
 fba.face.authoring._shapes
@@ -61,6 +61,7 @@ fba.body._skeleton
 fba.body.solve
 fba.body.skin
 fba.body
+fba.body.simplification
 fba.body.builtin
 fba.body.gait
 fba.body.importers

@@ -32,6 +32,8 @@ from fba.carriage.sending import DatagramWriter  # noqa: E402
 from fba.face import FaceModel, feature_point_names, neutral_points  # noqa: E402
 from fba.formats import read_motion  # noqa: E402
 from fba.live import KINDS  # noqa: E402
+from fba.outlines import View  # noqa: E402
+from fba.outlines._index_file import Stored, Stream, pack_mask, write_index  # noqa: E402
 from fba.persona import learn  # noqa: E402
 from fba.serving import Plane  # noqa: E402
 from gltf_documents import Sheet  # noqa: E402
@@ -309,6 +311,35 @@ def looking(folder: Path) -> bytes:
     return path.read_bytes()
 
 
+def stored(path: Path) -> bytes:
+    """Return an archive with its members stored, so that mutations reach what they hold."""
+    data = io.BytesIO()
+    with zipfile.ZipFile(path) as packed, zipfile.ZipFile(data, "w", zipfile.ZIP_STORED) as archive:
+        for member in packed.infolist():
+            info = zipfile.ZipInfo(member.filename, member.date_time)
+            info.create_system = 3  # Unix, everywhere
+            archive.writestr(info, packed.read(member))
+    return data.getvalue()
+
+
+def outlines(folder: Path) -> bytes:
+    """Return an index of two poses of a performance, each seen from two sides as a square."""
+    mask = np.zeros((100, 100), dtype=bool)
+    mask[20:80, 30:70] = True
+    steps = np.arange(4 * 64 * 3, dtype=np.float32).reshape(4, 64, 3) / 1024
+    path = folder / "a.outlines"
+    write_index(
+        path,
+        Stored(
+            (Stream("walk", Fraction(25), (True,) * 68, (False,) * 296),),
+            (View(0.0, 0.0), View(90.0, 0.0)),
+            np.zeros((2, 68), np.int32), np.zeros((2, 296), np.int32), np.arange(2), np.arange(2),
+            np.zeros(2, np.int32), np.stack([pack_mask(mask)] * 4), steps,
+        ),
+    )  # fmt: skip
+    return stored(path)
+
+
 def persona(folder: Path) -> bytes:
     """Return a Persona of an actor who smiles, its members stored, so that mutations reach what they hold.
 
@@ -322,13 +353,7 @@ def persona(folder: Path) -> bytes:
         for name, part in learnt.parts.items()
     }  # fmt: skip
     replace(learnt, neutral=_rounded(learnt.neutral), parts=parts).save(path)
-    data = io.BytesIO()
-    with zipfile.ZipFile(path) as packed, zipfile.ZipFile(data, "w", zipfile.ZIP_STORED) as archive:
-        for member in packed.infolist():
-            info = zipfile.ZipInfo(member.filename, member.date_time)
-            info.create_system = 3  # Unix, everywhere
-            archive.writestr(info, packed.read(member))
-    return data.getvalue()
+    return stored(path)
 
 
 def _rounded(values: Float64) -> Float64:
@@ -538,6 +563,7 @@ def corpus(folder: Path) -> dict[str, dict[str, bytes]]:
         "rtp": packets(),
         "smpl": smpl(),
         "arf": avatar_units(folder),
+        "outlines": {"square": outlines(folder)},
         "persona": {"actor": persona(folder)},
         "obj": {"triangles": OBJ.encode()},
         "mtl": {"two": MTL.encode()},

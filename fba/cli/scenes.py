@@ -109,6 +109,10 @@ class SceneOptions(Reading):
         help="What else is shown; repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, "
         "normals; shadows, wrinkles, eyes, teeth, hair=off; background=grey or transparent.",
     )
+    lod: Literal["auto", "full", "0", "1", "2", "3", "4"] | None = option(
+        help="Level of detail of faces: by their size in pixels (default), or one of those that the model "
+        "holds, from fine to coarse; 0 or full: all triangles, also of bodies."
+    )
     axes: Literal["iso", "vreng"] = option(
         default="iso", help="Which way BAPs turn: as the standard says, or as in some old files."
     )
@@ -229,7 +233,7 @@ def build_scene(
         from fba_player.scene.compare import CompareScene
 
         result = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
-    for switch, state in how.shows:
+    for switch, state in (*how.shows, *([("lod", how.lod)] if how.lod is not None else [])):
         result.show(switch, state)
     result.follow, result.orbit = how.follow, how.orbit
     return result

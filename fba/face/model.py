@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -81,7 +82,8 @@ class FaceModel(Meshes[Part]):
     FAPs follow from sent ones, or None for the standard's mates. definitions: the FAPs of visemes and
     expressions. lost: FAPs without tables and why, by number. notes: origin, licence and the like. wrinkles:
     whether players draw wrinkles on the skin as FAPs move it; drawn faces look wrong with them. levels:
-    coarser faces for small sizes on the screen, from fine to coarse; see `fba.face.simplification`.
+    coarser faces for small sizes on the screen, from fine to coarse; see `fba.face.simplification`. Those of
+    another shape are left out, as after `replace(model, parts=...)`.
 
     Axes: +x the subject's left, +y up, +z forward. Raises ModelError naming the part, point or FAP that is
     wrong.
@@ -117,7 +119,8 @@ class FaceModel(Meshes[Part]):
                 )
         object.__setattr__(self, "lost", dict(self.lost))
         object.__setattr__(self, "notes", dict(self.notes))
-        object.__setattr__(self, "levels", tuple(self.levels))
+        own = shape_key(self.parts) if self.levels else ""
+        object.__setattr__(self, "levels", tuple(level for level in self.levels if level.shape == own))
         for number, level in enumerate(self.levels):
             level.check(self, f"level {number + 1}")
         _ = self.fapu  # raises ModelError for a face without units
@@ -237,11 +240,16 @@ class FaceModel(Meshes[Part]):
 class DetailLevel:
     """A coarser face of the same parts, and how it belongs to the full one.
 
-    parents: int32 (V,), the vertex of `model` that stands for each of the full face's; read-only.
+    parents: int32 (V,), the vertex of `model` that stands for each of the full face's; read-only. error: the
+    root-mean-square distance (m) of the full face's vertices from it, in the pose where that is largest.
+    shape: `shape_key` of the full face's parts. The level may lack tables: then it moves as the full face
+    does at the places of its vertices.
     """
 
     model: FaceModel
     parents: Int32
+    error: float
+    shape: str
 
     def __post_init__(self) -> None:
         parents = np.array(self.parents, dtype=np.int32)
@@ -250,6 +258,8 @@ class DetailLevel:
 
     def check(self, full: FaceModel, where: str) -> None:
         """Raise ModelError where this is no level of a face."""
+        if not 0 <= self.error < np.inf:
+            raise ModelError(f"{where}: its error {self.error} is not a distance")
         if self.model.levels:
             raise ModelError(f"{where}: a level of detail has no levels itself")
         if [part.name for part in self.model.parts] != [part.name for part in full.parts]:
@@ -258,6 +268,16 @@ class DetailLevel:
             raise ModelError(f"{where}: {len(full.vertices)} parents are needed, not {self.parents.shape}")
         if len(self.parents) and not 0 <= self.parents.min() <= self.parents.max() < len(self.model.vertices):
             raise ModelError(f"{where}: parents beyond its {len(self.model.vertices)} vertices")
+
+
+def shape_key(parts: Sequence[Part]) -> str:
+    """Return a digest of the vertices and triangles of parts, equal for faces of the same shape."""
+    digest = hashlib.sha256()
+    for part in parts:
+        for array in (part.vertices, part.triangles):
+            digest.update(f"{array.shape}".encode())
+            digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()
 
 
 def bind(parts: tuple[Part, ...], points: npt.ArrayLike, most: float) -> Int32:

@@ -7,7 +7,7 @@ anew, by least squares, so that the simplified face moves as nearly as it can li
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,10 +16,19 @@ import numpy as np
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError
 from fba.face._tables import FaceDefMesh, FaceDefTables, interval_lengths
+from fba.face.authoring.surface.landmarks import find_landmarks, weld_skin
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
-from fba.face.model import DetailLevel, FaceModel, Part
-from fba.mesh.simplify import Level, Simplification, place_on_level, simplify
+from fba.face.model import DetailLevel, FaceModel, shape_key
+from fba.mesh.simplify import (
+    Level,
+    Simplification,
+    carry_parts,
+    part_looks,
+    part_starts,
+    place_on_level,
+    simplify,
+)
 from fba.parameters import FAP_COUNT, faps
 
 POSES: tuple[dict[int, int], ...] = (
@@ -40,6 +49,9 @@ TURNING_FAPS = (3, 19, 20, 21, 22, 47)
 IMPORTANCE = 300.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
+LID_MARGINS = tuple(f"{side} {lid} lid" for side in ("left", "right") for lid in ("upper", "lower"))
+MARGIN_SHARE = 0.5
+"""Share of the triangles from which on the vertices of the margins of the lids stay."""
 LID_SHARE = 4.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5
@@ -70,6 +82,7 @@ class FaceSimplification:
     mesh: Simplification
     poses: Float64
     """(K, V, 3), the face in `POSES`, without the head's turn."""
+    _kept: Bool
 
     def within(self, error: float) -> Level:
         """Return the coarsest mesh of which 99 % of the vertices are off by at most this error (m), at rest
@@ -86,52 +99,32 @@ class FaceSimplification:
     def error(self, level: Level) -> float:
         """Return the distance (m) within which 99 % of the full face's vertices are of a level, in the worst
         pose."""
+        return max(self._errors(level, lambda away: float(np.percentile(away, PERCENT))))
+
+    def _errors(self, level: Level, sum_up: Callable[[Float64], float]) -> list[float]:
+        """Return, for each pose, a number for the distances (V,) of the full face's vertices from a level."""
         rows, weights = place_on_level(self.mesh.positions, level)
         errors = []
         for pose in self.poses:
             moved = level.positions + level.carry(pose - self.poses[0])
             off = np.einsum("nk,nkd->nd", weights, moved[rows]) - pose
-            errors.append(float(np.percentile(np.linalg.norm(off, axis=1), PERCENT)))
-        return max(errors)
+            errors.append(sum_up(np.linalg.norm(off, axis=1)))
+        return errors
 
-    def build(self, level: Level) -> DetailLevel:
-        """Return the face of a level of the mesh, with all that it carries."""
+    def build(self, level: Level, *, tables: bool = True) -> DetailLevel:
+        """Return the face of a level of the mesh, with all that it carries. tables: whether with those."""
         model = self.model
-        counts = [len(part.vertices) for part in model.parts]
-        owner = np.repeat(np.arange(len(counts)), counts)[level.rows[:, 0]]
-        starts = np.searchsorted(owner, np.arange(len(counts) + 1)).tolist()
-        parts = tuple(
-            self._part(part, level, slice(starts[number], starts[number + 1]))
-            for number, part in enumerate(model.parts)
-        )
+        parts = tuple(replace(part, **arrays) for part, _, arrays in carry_parts(model, level))
         bound = np.where((model.bound >= 0) & self._used[model.bound], level.parents[model.bound], -1)
         face = replace(
             model,
             parts=parts,
             bound=bound.astype(np.int32),
-            tables=_fit_tables(model, level, starts, self._pinned, self.mesh.positions),
+            tables=_fit_tables(model, level, self._pinned, self.mesh.positions) if tables else (),
             levels=(),
         )
-        return DetailLevel(face, level.parents)
-
-    def _part(self, part: Part, level: Level, rows: slice) -> Part:
-        model = self.model
-        start = model.starts[part.name]
-        sources, weights = level.rows[rows] - start, level.weights[rows]
-
-        def carry(values: Float32 | None) -> Float32 | None:
-            if values is None:
-                return None
-            return np.asarray(np.einsum("nk,nkd->nd", weights, values[sources]), dtype=np.float32)
-
-        corners = level.triangles[np.isin(level.triangles[:, 0], np.arange(rows.start, rows.stop))]
-        return replace(
-            part,
-            vertices=level.positions[rows].astype(np.float32),
-            triangles=corners - np.int32(rows.start),
-            normals=carry(part.normals),
-            texcoords=carry(part.texcoords),
-            colours=carry(part.colours),
+        return DetailLevel(
+            face, level.parents, max(self._errors(level, _root_mean_square)), shape_key(model.parts)
         )
 
     @cached_property
@@ -143,7 +136,7 @@ class FaceSimplification:
     @cached_property
     def _pinned(self) -> Int32:
         """Vertices that stay, which move exactly as they do on the full face."""
-        return np.flatnonzero(_find_pinned(self.model) & self._used).astype(np.int32)
+        return np.flatnonzero(self._kept & self._used).astype(np.int32)
 
 
 def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplification:
@@ -163,15 +156,16 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         )
     deformer = Deformer(model)
     poses = np.stack([deformer.local(_values(pose)) for pose in POSES]).astype(np.float64)
+    kept = _find_pinned(model, margins=fewest >= MARGIN_SHARE * len(model.triangles))
     mesh = simplify(
         poses,
         model.triangles,
         faces,
-        pinned=_find_pinned(model),
-        looks=_looks(model),
+        pinned=kept,
+        looks=part_looks(model),
         importance=_importance(model),
     )
-    return FaceSimplification(model, mesh, poses)
+    return FaceSimplification(model, mesh, poses, kept)
 
 
 def level_sizes(model: FaceModel, count: int) -> list[int]:
@@ -184,6 +178,10 @@ def level_sizes(model: FaceModel, count: int) -> list[int]:
     return [max(first, len(model.parts)), *(faces for faces in others if faces >= least)]
 
 
+def _root_mean_square(away: Float64) -> float:
+    return float(np.sqrt((away**2).mean()))
+
+
 def _values(pose: dict[int, int]) -> Float32:
     values = np.zeros(FAP_COUNT, dtype=np.float32)
     for number, value in pose.items():
@@ -191,11 +189,17 @@ def _values(pose: dict[int, int]) -> Float32:
     return values
 
 
-def _find_pinned(model: FaceModel) -> Bool:
-    """Return (V,): vertices of feature points, and some around each pupil, which give its size."""
+def _find_pinned(model: FaceModel, *, margins: bool) -> Bool:
+    """Return (V,): vertices of feature points, and some around each pupil, which give its size. margins:
+    whether also those of the margins of the lids."""
     pinned = np.zeros(len(model.vertices), dtype=bool)
     pinned[model.bound[model.bound >= 0]] = True
     eyes = {part.name for part in model.of_kind("eye")}
+    if margins:
+        marks = find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
+        for name in LID_MARGINS:
+            margin = np.isin(marks.surface.number, marks.contour(name))
+            pinned[marks.surface.pool[margin]] = True
     for fap in PUPIL_FAP.values():
         for mesh in model.table_of[fap].meshes if fap in model.table_of else ():
             size = np.linalg.norm(mesh.displacements, axis=2).max(axis=1, initial=0.0)
@@ -205,19 +209,6 @@ def _find_pinned(model: FaceModel) -> Bool:
                 around = np.argsort(np.arctan2(off[:, 1], off[:, 0]))
                 pinned[rim[around[:: -(-len(rim) // RIM_VERTICES)]]] = True
     return pinned
-
-
-def _looks(model: FaceModel) -> Float64:
-    """Return (V, 7): number of the part, texture coordinates, colours; differences between them are seams."""
-    looks = np.zeros((len(model.vertices), 7))
-    for number, part in enumerate(model.parts):
-        rows = slice(model.starts[part.name], model.starts[part.name] + len(part.vertices))
-        looks[rows, 0] = number
-        if part.texcoords is not None:
-            looks[rows, 1:3] = part.texcoords
-        if part.colours is not None:
-            looks[rows, 3:] = part.colours
-    return looks
 
 
 def _importance(model: FaceModel) -> Float64:
@@ -239,7 +230,7 @@ def _importance(model: FaceModel) -> Float64:
 
 
 def _fit_tables(
-    model: FaceModel, level: Level, starts: list[int], pinned: Int32, positions: Float64
+    model: FaceModel, level: Level, pinned: Int32, positions: Float64
 ) -> tuple[FaceDefTables, ...]:
     """Return the tables with which a level moves most like the full face, by least squares.
 
@@ -249,6 +240,7 @@ def _fit_tables(
     from scipy.sparse import coo_array, eye_array
     from scipy.sparse.linalg import splu
 
+    starts = part_starts(model, level)
     point = np.unique(level.points, return_inverse=True)[1].astype(np.int32)
     count, total = int(point.max()) + 1, len(positions)
     placed, weights = place_on_level(positions, level)

@@ -8,6 +8,7 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from fractions import Fraction
+from tokenize import TokenError
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -148,7 +149,7 @@ def _read_array(archive: zipfile.ZipFile, name: str, path: str | os.PathLike[str
             if len(data) != dtype.itemsize * int(np.prod(shape, dtype=object)):
                 raise ValueError(f"it has {len(data)} bytes, but its header says {shape}, {dtype}")
             return np.frombuffer(data, dtype=dtype).reshape(shape)
-        except (ValueError, TypeError, SyntaxError) as error:
+        except (ValueError, TypeError, SyntaxError, TokenError) as error:
             raise FormatError(f"its array {name!r} is damaged: {error}", path=path) from error
 
 

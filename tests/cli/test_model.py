@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fba.body import BodyModel
 from fba.cli.model_text import error_lines, judge_import
 from fba.cli.printing import table_lines
 from fba.face import FaceModel, checks, feature_point_names
@@ -285,6 +286,16 @@ def test_simplify_writes_a_smaller_face_and_tells_how_good_it_is(run: Run, tmp_p
     assert "exists" in err
 
 
+def test_simplify_takes_a_body_too(run: Run, tmp_path: Path) -> None:
+    target = tmp_path / "small.glb"
+    code, out, _ = run("model", "simplify", "--default", "--body", "-o", target, "--ratio", 0.25, "--json")
+    assert code == 0
+    (row,) = json.loads(out)["levels"]
+    small = BodyModel.load(target)
+    assert row == {"faces": len(small.triangles), "vertices": len(small.vertices)}
+    assert row["faces"] <= round(0.25 * len(BodyModel.default().triangles))
+
+
 def test_simplify_stores_levels_with_the_model(run: Run, tmp_path: Path) -> None:
     head = small_head(cell=0.004)
     head.save(tmp_path / "head.glb")
@@ -304,7 +315,8 @@ def test_simplify_stores_levels_with_the_model(run: Run, tmp_path: Path) -> None
     [
         (["--default"], "how far to simplify is missing"),
         (["--default", "--faces", 9, "--ratio", 0.5], "--faces and --ratio contradict each other"),
-        (["--faces", 900], "give either the HEAD to simplify"),
+        (["--faces", 900], "give either the MODEL to simplify"),
+        (["--default", "--body", "--levels", 2], "--body goes with --faces or --ratio"),
         (["--default", "--ratio", 0], "0"),
         (["--default", "--faces", 0], "0"),
         (["--default", "--levels", 17], "17"),

@@ -151,6 +151,7 @@ READING = {
     "arf": (
         "fba.carriage.avatar_units", "fba.formats.avatar._reader", "fba.formats.avatar._container",
     ),
+    "outlines": ("fba.outlines._index_file",),
     "persona": ("fba.persona._persona", "fba.persona.recognition._archive"),
     "live": (
         "fba.live._protocols.livelink", "fba.live._protocols.ifacialmocap", "fba.live._protocols.vtube",

@@ -1,4 +1,4 @@
-"""Makes the built-in head: `fba/face/builtin/head.glb`.
+"""Makes the built-in head, `fba/face/builtin/head.glb`, and its levels of detail, `levels.glb`.
 
     python tools/figure/make_head.py
 
@@ -15,6 +15,7 @@ import eyeballs
 import garment
 import landmarks
 import lashes
+import make_levels
 import mouth
 import numpy as np
 import paint
@@ -216,3 +217,4 @@ if __name__ == "__main__":
     print(
         f"{TARGET}: {len(made.vertices)} vertices, {len(made.triangles)} triangles, {len(made.tables)} FAPs"
     )
+    make_levels.main()

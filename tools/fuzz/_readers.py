@@ -37,6 +37,7 @@ from fba.formats.text.fap import read_fap, write_fap
 from fba.gltf import read_gltf
 from fba.live import KINDS, Capture, StreamFile, StreamRecorder
 from fba.mesh import read_mtl, read_obj, read_ply, read_vrml, read_wfm
+from fba.outlines import Index
 from fba.persona import Persona
 from fba.source import naming_file
 from tools.fuzz._outcome import ContractError, Outcome
@@ -144,6 +145,11 @@ def check_arf(data: bytes, folder: Path) -> Outcome:
 def check_persona(data: bytes, folder: Path) -> Outcome:
     """Load a Persona."""
     return _check_file(_with_checksums(data), folder / "input.persona", Persona.load)
+
+
+def check_outlines(data: bytes, folder: Path) -> Outcome:
+    """Load an index of outlines."""
+    return _check_file(_with_checksums(data), folder / "input.outlines", Index.load)
 
 
 _MEMBER, _DIRECTORY = b"PK\3\4", b"PK\1\2"

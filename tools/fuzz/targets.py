@@ -84,6 +84,10 @@ def targets() -> tuple[Target, ...]:
             "arf", "avatar animation units, alone and in containers", b"PK\x03\x04", b"\x02\0\0\0\x0f",
             b"\x04\0\0\0\x4b", b"mpeg4-body", b'"parent": 1', b'"shapes": [1]', *_TEXT,
         ),
+        _reader(
+            "outlines", "indexes of outlines", b"PK\x03\x04", b'"rate": "1/0"', b'"views": [[0, 0]]',
+            b"'shape': (4, 9)", b"'descr': '<f8'", *_TEXT,
+        ),
         _reader("persona", "Personas", b"PK\x03\x04", b'"kind"', b"NEUTRAL", b"'shape': (4, 9)", *_TEXT),
         _reader(
             "live", "live captures, a datagram in each part", b"\0\0\0\0", b"\xff\xff", b"\x06", b"#bundle\0",

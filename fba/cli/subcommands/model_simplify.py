@@ -11,7 +11,7 @@ import click
 from fba.cli import options
 from fba.cli.coding.tolerance_options import LENGTH
 from fba.cli.command import Command, examples
-from fba.cli.inputs import read_model
+from fba.cli.inputs import read_body, read_model
 from fba.cli.option_fields import option, with_options
 from fba.cli.outputs import Output, Outputs, check_glb, display_name, output_option
 from fba.cli.printing import Progress
@@ -39,7 +39,7 @@ class _Goal:
         type=click.IntRange(1, MAX_LEVELS),
         metavar="N",
         help="Keep all triangles, and store up to N coarser levels beside them, each with 0.32 of the "
-        "triangles of the one before, for programs that read FBA_face. `fba play` makes its own.",
+        "triangles of the one before; `fba play` and `fba render` draw them where the face is small.",
     )
 
     def check(self) -> None:
@@ -61,29 +61,38 @@ class _Goal:
         "fba model simplify head.glb -o small.glb --ratio 0.1",
         "fba model simplify head.glb -o small.glb --error 0.5mm",
         "fba model simplify head.glb -o levels.glb --levels 4",
+        "fba model simplify person.glb --body -o small.glb --ratio 0.25",
     ),
 )
-@click.argument("head", metavar="[HEAD]", required=False, type=options.EXISTING)
+@click.argument("head", metavar="[MODEL]", required=False, type=options.EXISTING)
 @with_options
 def command(
     head: Path | None,
     goal: _Goal,
-    default: bool = option(default=False, help="Use the built-in head instead of HEAD."),
+    default: bool = option(default=False, help="Use the built-in head, or body, instead of MODEL."),
+    body: bool = option(
+        default=False, help="MODEL is a body; --faces or --ratio simplifies it with its skin weights."
+    ),
     output: Path = output_option("OUT.glb", "Model to write; - for standard output.", required=True),
     no_clobber: bool = options.no_clobber_option,
     as_json: bool = options.json_option,
 ) -> None:
-    """Reduce the triangles of a face model so that FAPs still move it, or store levels of detail with it.
+    """Reduce the triangles of a model so that FAPs still move it, or store levels of detail with it.
 
     Lips, lids and what else moves keep more triangles than the rest; feature points stay where they are.
     Parts, seams, textures, colours, normals and the tables of the FAPs are carried along. The errors are
-    distances within which 99 % of the vertices of HEAD are of the result, in the worst of five poses.
+    distances within which 99 % of the vertices of MODEL are of the result, in the worst of five poses.
     """
     goal.check()
     if (head is None) != default:
-        raise click.UsageError("give either the HEAD to simplify, or --default for the built-in head")
+        raise click.UsageError("give either the MODEL to simplify, or --default for the built-in one")
+    if body and goal.faces is None and goal.ratio is None:
+        raise click.UsageError("--body goes with --faces or --ratio: bodies have no errors and no levels")
     outputs = Outputs([Output("--output", output)], [head], no_clobber=no_clobber)
     check_glb(output)
+    if body:
+        _simplify_body(head, goal, output, outputs, as_json=as_json)
+        return
     from fba.face import FaceModel, checks
 
     model = read_model(head) or FaceModel.default()
@@ -104,6 +113,24 @@ def command(
             f"  {row['faces']:6} triangles, {row['vertices']:6} vertices, within {row['error_mm']:.2f} mm; "
             f"{row['findings']} errors by fba model validate"
         )
+
+
+def _simplify_body(path: Path | None, goal: _Goal, output: Path, outputs: Outputs, *, as_json: bool) -> None:
+    from fba.body import BodyModel
+    from fba.body.simplification import simplify_body
+
+    model = read_body(path) or BodyModel.default()
+    with Progress("simplifying", None):
+        made = simplify_body(model, goal.faces or max(round(len(model.triangles) * (goal.ratio or 0.0)), 1))
+    with outputs.file(output) as file:
+        made.save(file)
+    before, left = len(model.triangles), len(made.triangles)
+    if as_json:
+        row = {"faces": left, "vertices": len(made.vertices)}
+        outputs.print_json({"output": str(output), "faces": before, "levels": [row]})
+        return
+    outputs.say(f"{display_name(output)}: {model.name or 'a body'}, {before} triangles before")
+    outputs.say(f"  {left:6} triangles, {len(made.vertices):6} vertices")
 
 
 def _simplified(model: FaceModel, goal: _Goal) -> tuple[FaceModel, list[dict[str, Any]]]:

@@ -1,4 +1,7 @@
-"""The built-in head: `head.glb`, made by `tools/figure/make_head.py`; see NOTICE.txt for its origin."""
+"""The built-in head: `head.glb`, made by `tools/figure/make_head.py`; see NOTICE.txt for its origin.
+
+`levels.glb`, made by `tools/figure/make_levels.py`, holds its levels of detail.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,17 @@ if TYPE_CHECKING:
 
 @cache
 def default() -> FaceModel:
-    """Return the built-in head; read on first use."""
+    """Return the built-in head with its levels of detail, which have no tables; read on first use."""
     from dataclasses import replace
 
     from fba.face._expressions import Definitions
     from fba.face.gltf._storage import load
 
-    with as_file(files(__package__) / "head.glb") as path:
+    folder = files(__package__)
+    with as_file(folder / "head.glb") as path, as_file(folder / "levels.glb") as levels_path:
+        head, levels = load(path), []
+        for level in load(levels_path).levels:  # with the materials of the head, which has the pictures
+            parts = [replace(part, material=head.part(part.name).material) for part in level.model.parts]
+            levels.append(replace(level, model=replace(level.model, parts=tuple(parts))))
         # The current definitions, so that visemes can be tuned without a new head.glb.
-        return replace(load(path), definitions=Definitions.default())
+        return replace(head, definitions=Definitions.default(), levels=tuple(levels))

@@ -15,7 +15,7 @@ from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.model import PART_KINDS, DetailLevel, FaceModel, Part
+from fba.face.model import PART_KINDS, DetailLevel, FaceModel, Part, shape_key
 from fba.gltf import (
     Budget,
     Document,
@@ -83,7 +83,7 @@ def _levels(document: Document, listed: Value, parts: tuple[Part, ...]) -> tuple
     """Return the levels of detail, each a document in a buffer view; the pictures are those of the face."""
     levels = []
     pictures = {part.name: part.material.texture for part in parts}
-    count = sum(len(part.vertices) for part in parts)
+    count, key = sum(len(part.vertices) for part in parts), shape_key(parts)
     for number, entry in enumerate(listed.elements(MAX_LEVELS)):
         inner = document.embedded(entry.member("model"), f"level {number + 1}")
         content = optional_member(inner.root.get("extensions"), NAME)
@@ -95,7 +95,8 @@ def _levels(document: Document, listed: Value, parts: tuple[Part, ...]) -> tuple
             for part in model.parts
         ]
         parents = unpack(document, entry.member("parents"), np.int32, (count,))
-        levels.append(DetailLevel(replace(model, parts=tuple(shown)), parents))
+        error = entry.member("error").number()
+        levels.append(DetailLevel(replace(model, parts=tuple(shown)), parents, error, key))
     return tuple(levels)
 
 

@@ -110,7 +110,11 @@ def _level(builder: Builder, level: DetailLevel) -> dict[str, Any]:
     """Return a level of detail: a face model in a buffer view, without the pictures, which it shares."""
     plain = [replace(part, material=replace(part.material, texture=None)) for part in level.model.parts]
     model = build(replace(level.model, parts=tuple(plain)), morphs=False)
-    return {"model": builder.blob(model.glb()), "parents": builder.packed(level.parents)}
+    return {
+        "model": builder.blob(model.glb()),
+        "parents": builder.packed(level.parents),
+        "error": level.error,
+    }
 
 
 def _part(model: FaceModel, number: int, node: int) -> dict[str, Any]:

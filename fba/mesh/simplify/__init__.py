@@ -3,10 +3,11 @@
 from fba.mesh.simplify._memoryless import (
     Level,
     Simplification,
+    place_on_full,
     place_on_level,
-    place_on_triangles,
     simplify,
 )
+from fba.mesh.simplify._parts import carry_parts, part_looks, part_starts
 from fba.mesh.simplify._quadrics import TOLERANCES, DetailLevels, simplify_by_quadrics
 
 __all__ = [
@@ -14,8 +15,11 @@ __all__ = [
     "DetailLevels",
     "Level",
     "Simplification",
+    "carry_parts",
+    "part_looks",
+    "part_starts",
+    "place_on_full",
     "place_on_level",
-    "place_on_triangles",
     "simplify",
     "simplify_by_quadrics",
 ]

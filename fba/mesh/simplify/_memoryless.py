@@ -101,9 +101,7 @@ class Simplification:
 
     def _sources(self, positions: Float64, parents: Int32) -> tuple[Int32, Float64]:
         """Return rows and weights of the nearest points on the triangles that vertices stand for."""
-        full = self._full
-        own = np.arange(len(positions), dtype=np.int32)
-        return _nearest(positions, self.positions[full], parents[full], own, full)
+        return place_on_full(positions, self.positions, self._full, parents)
 
 
 def simplify(
@@ -182,18 +180,20 @@ def simplify(
 def place_on_level(positions: Floating, level: Level) -> tuple[Int32, Float64]:
     """Return where each vertex (N, 3) of the full mesh lies on a level: int32 (N, 3), vertices of the level,
     and float64 (N, 3), their weights. Only triangles around the vertex that stands for it count."""
-    return place_on_triangles(positions, level.positions, level.triangles, level.parents)
+    corners = level.positions[level.triangles]
+    return _nearest(positions, corners, level.triangles, level.parents, level.triangles)
 
 
-def place_on_triangles(
-    positions: Floating, vertices: Floating, triangles: Int32, parents: Integer
+def place_on_full(
+    positions: Floating, vertices: Floating, triangles: Int32, parents: Int32
 ) -> tuple[Int32, Float64]:
-    """Return the nearest point to each of positions (N, 3) on the triangles around one vertex.
+    """Return where each vertex (M, 3) of a level lies on the full mesh: int32 (M, 3), vertices of the full
+    mesh, and float64 (M, 3), their weights. Only triangles with a corner that it stands for count.
 
-    vertices: (M, 3). triangles: (F, 3). parents: (N,), the vertex whose triangles count. The results are
-    int32 (N, 3), the triangle's corners, and float64 (N, 3), their weights.
+    vertices: (N, 3), and triangles: (F, 3), of the full mesh. parents: (N,), vertices of the level.
     """
-    return _nearest(positions, np.asarray(vertices)[triangles], triangles, parents, triangles)
+    own = np.arange(len(positions), dtype=np.int32)
+    return _nearest(positions, np.asarray(vertices)[triangles], parents[triangles], own, triangles)
 
 
 def _nearest(

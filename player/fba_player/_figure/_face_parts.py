@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fba.arrays import Float32, Float64, Int32, Intp
+from fba.arrays import Bool, Float32, Float64, Int32, Intp
+from fba.compiled import is_compiled
 from fba.errors import FbaWarning
 from fba.face import FaceModel, Part
-from fba.mesh.simplify import DetailLevels
+from fba.mesh import vertex_normals
+from fba.mesh.simplify import DetailLevels, place_on_full
 from fba.parameters import point_rows
 from fba.rotations import unit
 from fba.sampling import smoothstep
+from fba_player._figure.wrinkles import place_wrinkles
 from fba_player._mesh.textures import RELIEF, FacePicture, load_picture, texture_breadth
-from fba_player.view._view import FaceShape
+from fba_player.view._view import CoarseShape, FaceShape
 
 if TYPE_CHECKING:
     from fba.body import BodyModel, BodyPart
@@ -89,12 +92,10 @@ def make_shape(part: Part, sways: Float32) -> FaceShape:
     )
 
 
-def detail_levels(
-    part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None
-) -> DetailLevels:
-    """Return the levels of detail of a part for these poses, (V, 3) each. more: (V, N), attributes to
-    preserve besides normals, colours and texture, scaled to metres."""
-    columns = list(poses)
+def detail_levels(part: BodyPart, more: Float32) -> DetailLevels:
+    """Return the levels of detail of a body's part. more: (V, N), attributes to preserve besides normals,
+    colours and texture, scaled to metres."""
+    columns = [part.vertices]
     if part.normals is not None:
         columns.append(part.normals * NORMAL_WEIGHT)
     if part.texcoords is not None and len(part.triangles):
@@ -102,9 +103,8 @@ def detail_levels(
         columns.append(part.texcoords * (TEXTURE_WEIGHT * metres))
     if part.colours is not None:
         columns.append(part.colours[:, :3] * COLOUR_WEIGHT)
-    if more is not None:
-        columns.append(more)
-    return DetailLevels(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
+    columns.append(more)
+    return DetailLevels(np.concatenate(columns, axis=1).astype(np.float32), 1, part.triangles)
 
 
 def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
@@ -113,11 +113,53 @@ def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
     return slice(start, start + len(model.part(name).vertices))
 
 
-def with_triangles(shape: FaceShape, triangles: Int32) -> FaceShape:
-    """Return the shape with these triangles (F, 3) only."""
-    triangles = np.ascontiguousarray(triangles, dtype=np.int32)
-    coarser = None if shape.coarser is None else replace(shape.coarser, triangles=triangles)
-    return replace(shape, triangles=triangles, coarser=coarser)
+def coarse_shapes(model: FaceModel, part: Part, shape: FaceShape) -> tuple[CoarseShape, ...]:
+    """Return a part's shape at the model's levels of detail; none without numba."""
+    if not is_compiled():
+        return ()
+    normals = vertex_normals(part.vertices, part.triangles) if part.normals is None else part.normals
+    shapes = []
+    for level in model.levels:
+        own, rows = level.model.part(part.name), part_rows(model, part.name)
+        parents = level.parents[rows] - np.int32(level.model.starts[part.name])
+        if not len(own.triangles) or not 0 <= parents.min() <= parents.max() < len(own.vertices):
+            return ()
+        corners, weights = place_on_full(own.vertices, part.vertices, part.triangles, parents)
+        at, out = (np.einsum("nk,nkd->nd", weights, array[corners]) for array in (part.vertices, normals))
+        heights = ((own.vertices - at) * unit(out)).sum(axis=1)
+        places = shape.wrinkle_places
+        coarse = replace(
+            shape,
+            triangles=own.triangles,
+            colours=part_colours(own, part.material.colour),
+            sway=np.einsum("nk,nk->n", weights, shape.sway[corners]).astype(np.float32),
+            texcoords=own.texcoords if shape.texcoords is not None else None,
+            wrinkle_places=None if places is None else place_wrinkles(model, own),
+            rest=None,
+        )
+        shapes.append(
+            CoarseShape(
+                coarse, corners, weights.astype(np.float32), heights.astype(np.float32),
+                np.ascontiguousarray(parents), level.error, level,
+            )
+        )  # fmt: skip
+    return tuple(shapes)
+
+
+def keep_triangles(shape: FaceShape, vertices: Bool, *, whole: bool) -> FaceShape:
+    """Return the shape with those triangles of which one corner, or the whole, is among vertices (V,)."""
+
+    def left(triangles: Int32, kept: Bool) -> Int32:
+        chosen = kept[triangles].all(axis=1) if whole else kept[triangles].any(axis=1)
+        return np.ascontiguousarray(triangles[chosen], dtype=np.int32)
+
+    levels = tuple(
+        replace(
+            level, shape=replace(level.shape, triangles=left(level.shape.triangles, vertices[level.first]))
+        )
+        for level in shape.levels
+    )
+    return replace(shape, triangles=left(shape.triangles, vertices), levels=levels)
 
 
 def find_hairs(part: Part) -> Float32 | None:

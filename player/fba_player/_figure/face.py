@@ -13,16 +13,16 @@ from fba.arrays import Float32, Float64, Intp
 from fba.face import Deformer, FaceModel, Part
 from fba.face.eyeball import fit_sphere, flat_width
 from fba.geometry import fit_similarity
-from fba.parameters import FAP_COUNT, point_rows
+from fba.parameters import point_rows
 from fba_player._figure._face_parts import (
+    coarse_shapes,
     compute_sway,
-    detail_levels,
+    keep_triangles,
     make_shape,
     middle_of_points,
     part_rows,
-    with_triangles,
 )
-from fba_player._figure.face_light import MOUTH_OPEN, FaceLight
+from fba_player._figure.face_light import FaceLight
 from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
 from fba_player.view._camera import Subject
@@ -43,10 +43,6 @@ OPEN_LIDS = np.array([[0.0, 0.5, 0.86], [0.0, -0.5, 0.86], [1.0, 0.0, 0.3], [-1.
 """These points of an open eye, relative to its centre, in radii."""
 MIN_SWAY_ON_BODY = 0.45
 """On a body, vertices that turn with the head by less than this share are left out: the body has a neck."""
-
-GRIMACE = {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300,
-           6: 200, 7: 200, 53: 200, 54: 200}  # fmt: skip
-"""FAPs that close the eyes, raise the brows and widen the mouth: a pose that levels of detail preserve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,16 +227,15 @@ class FaceFigure:
         """The parts without the lower neck and shoulders."""
         shapes = {}
         for name, shape in self.shapes.items():
-            above = (shape.sway[shape.triangles] > MIN_SWAY_ON_BODY).all(axis=1)
-            if above.any():
-                shapes[name] = with_triangles(shape, shape.triangles[above])
+            above = keep_triangles(shape, shape.sway > MIN_SWAY_ON_BODY, whole=True)
+            if len(above.triangles):
+                shapes[name] = above
         return shapes
 
 
 def build_figure(model: FaceModel) -> FaceFigure:
     """Return a figure of any face. Its occlusion is computed on first use, in about a second."""
     deformer, sway = Deformer(model), compute_sway(model)
-    extremes = [_extreme_positions(deformer, faps) for faps in ({}, MOUTH_OPEN, GRIMACE)]
     shapes, eyeballs = {}, []
     for part in model.parts:
         eyeball = find_eyeball(part, model) if part.kind == "eye" else None
@@ -250,18 +245,10 @@ def build_figure(model: FaceModel) -> FaceFigure:
         rows = part_rows(model, part.name)
         shape = replace(make_shape(part, sway[rows]), wrinkle_places=place_wrinkles(model, part))
         if shape.across is None:  # single hairs are not simplified
-            shape = replace(shape, coarser=detail_levels(part, [positions[rows] for positions in extremes]))
+            shape = replace(shape, levels=coarse_shapes(model, part, shape), rest=part.vertices)
         shapes[part.name] = shape
     light = FaceLight(model, deformer, sway)
     return FaceFigure(model, deformer, sway, _head_centre(model), shapes, eyeballs, light)
-
-
-def _extreme_positions(deformer: Deformer, faps: dict[int, int]) -> Float32:
-    """Return float32 (V, 3): the face for values by FAP number, without the head's turn."""
-    values = np.zeros(FAP_COUNT, dtype=np.float32)
-    for number, value in faps.items():
-        values[number - 1] = value
-    return deformer.local(values)
 
 
 def _head_centre(model: FaceModel) -> Float64:

@@ -12,7 +12,7 @@ from fba.body import AttachedHead, BodyModel, BodyPart, attach_head
 from fba.body.head_attachment import skull_of
 from fba.face import Part
 from fba.parameters import point_rows
-from fba_player._figure._face_parts import detail_levels, make_shape, part_rows, with_triangles
+from fba_player._figure._face_parts import detail_levels, keep_triangles, make_shape, part_rows
 from fba_player._figure.body_light import BodyLight, build_body_light
 from fba_player._figure.face import FaceFigure
 from fba_player._figure.wrinkles import wrinkle_strengths
@@ -168,10 +168,9 @@ def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]
         part = model.part(name)
         if part.kind == "other" and part.vertices[:, 1].max() < chin:
             continue
-        hidden = head.hidden[figure.rows(name)]
-        visible = ~hidden[shape.triangles].all(axis=1)
-        if visible.any():
-            shapes[name] = with_triangles(shape, shape.triangles[visible])
+        visible = keep_triangles(shape, ~head.hidden[figure.rows(name)], whole=False)
+        if len(visible.triangles):
+            shapes[name] = visible
     return shapes
 
 
@@ -183,7 +182,7 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
     open_surface = part.material.two_sided
     return replace(
         shape, scatter=float(part.kind in SCATTERING_KINDS), two_sided=open_surface, closed=not open_surface,
-        name="", coarser=detail_levels(part, [part.vertices], carried.astype(np.float32)),
+        name="", coarser=detail_levels(part, carried.astype(np.float32)), rest=part.vertices,
     )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ SPACING = 0.036
 INNER_KINDS = ("teeth", "tongue", "mouth", "eye")
 """Kinds of parts that lie inside others and cast no shadow."""
 SAMPLING_ERROR = 0.0032
-"""Error (m) up to which surfaces are simplified before points are spread over them."""
+"""Error (m) up to which bodies are simplified before points are spread over them."""
 KEY_RAYS = 12
 """Number of rays of the key light."""
 KEY_RADIUS = 0.11
@@ -113,13 +113,13 @@ class ShadowCaster:
 
 def _spread(shape: FaceShape) -> Points | None:
     """Return points spread over a shape's surface at rest; None for a shape that casts no shadow."""
-    if shape.coarser is None or shape.kind in INNER_KINDS:
+    if shape.rest is None or shape.kind in INNER_KINDS:
         return None
-    coarse = shape.coarser.triangles_within(SAMPLING_ERROR)
+    coarse = None if shape.coarser is None else shape.coarser.triangles_within(SAMPLING_ERROR)
     triangles = shape.triangles if coarse is None else coarse
     if not len(triangles):
         return None
-    a, b, c = (shape.coarser.points[triangles[:, k], :3].astype(np.float64) for k in range(3))
+    a, b, c = (shape.rest[triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     ends = np.cumsum(area)
     count = int(ends[-1] / SPACING**2) + 1

@@ -15,7 +15,12 @@ from fba.mesh.simplify import TOLERANCES
 from fba_player.view._view import FaceMesh, FaceShape
 
 MAX_ERROR_PIXELS = 1.3
-"""Largest error of a coarser mesh, in pixels."""
+"""Largest error of a coarser mesh of a body, in pixels."""
+MAX_FACE_ERROR_PIXELS = 0.8
+"""Largest root-mean-square error of a face's level of detail, in pixels."""
+MORPH_SECONDS = 0.5
+"""Seconds in which the vertices of a face move from one level of detail to another."""
+FULL = ("full", "0")
 SAMPLED_VERTICES = 24
 """Number of vertices from which the distance to the camera is taken."""
 
@@ -29,16 +34,110 @@ class _Level:
     light: tuple[Float32, Float32] | None = None
 
 
+@dataclass
+class _Shown:
+    """The level of detail at which a face is shown, and the one that it is changing to since a time (s)."""
+
+    level: int
+    goal: int
+    since: float = 0.0
+
+    def change(self, wanted: int, now: float | None) -> float:
+        """Return the share, 0..1, of the change from `level` to `goal`, which without a clock is at once."""
+        if now is None:
+            self.level = self.goal = wanted
+            return 0.0
+        share = (now - self.since) / MORPH_SECONDS
+        if self.level != self.goal and share >= 1.0:
+            self.level = self.goal
+        if self.level == self.goal:
+            self.goal, self.since, share = wanted, now, 0.0
+        return max(share, 0.0)
+
+
 class Details:
-    """Chooses levels of detail; caches the coarser shapes."""
+    """Chooses levels of detail; caches the coarser shapes.
+
+    morphing: whether, in the last choice, a face was on its way from one level to another.
+    """
 
     def __init__(self) -> None:
         self._levels: WeakKeyDictionary[FaceShape, dict[int, _Level | None]] = WeakKeyDictionary()
+        self._shown: WeakKeyDictionary[FaceShape, dict[int, _Shown]] = WeakKeyDictionary()
+        self._lights: WeakKeyDictionary[FaceShape, tuple[Float32, Float32]] = WeakKeyDictionary()
+        self.morphing = False
 
-    def choose(self, meshes: list[FaceMesh], eye: npt.ArrayLike, pixel: float) -> list[FaceMesh]:
-        """Return the meshes at levels of detail for a camera at `eye` (3,). pixel: its size at distance 1."""
+    def choose(
+        self,
+        meshes: list[FaceMesh],
+        eye: npt.ArrayLike,
+        pixel: float,
+        lod: str = "auto",
+        now: float | None = None,
+    ) -> list[FaceMesh]:
+        """Return the meshes at levels of detail for a camera at `eye` (3,). pixel: its size at distance 1.
+
+        All parts of a face have the same level. lod: "auto" by size, or the level of faces, "0" for all
+        triangles. now: seconds, to change the level of a face gradually; None to change it at once.
+        """
         position = np.asarray(eye, dtype=np.float64)
-        return [self._choose(mesh, position, pixel) for mesh in meshes]
+        self.morphing = False
+        chosen, count = list(meshes), dict[FaceShape, int]()
+        for face in _faces(meshes):
+            parts = [meshes[number] for number in face]
+            away = min(distance(mesh, position) for mesh in parts)
+            errors = [level.error for level in parts[0].shape.levels]
+            wanted = bisect_right(errors, MAX_FACE_ERROR_PIXELS * pixel * away)
+            if lod != "auto":
+                wanted = 0 if lod in FULL else min(int(lod), len(errors))
+            first = parts[0].shape
+            count[first] = count.get(first, -1) + 1
+            shown = self._shown.setdefault(first, {}).setdefault(count[first], _Shown(wanted, wanted))
+            share = shown.change(wanted, now)
+            self.morphing |= shown.level != shown.goal
+            for number, mesh in zip(face, parts, strict=True):
+                chosen[number] = self._between(mesh, shown.level, shown.goal, share, away)
+        if lod not in FULL:
+            chosen = [self._choose(mesh, position, pixel) for mesh in chosen]
+        return chosen
+
+    def _between(self, mesh: FaceMesh, level: int, goal: int, share: float, away: float) -> FaceMesh:
+        """Return a part of a face on the way from one level to another."""
+        if level == goal:
+            return self._carry(mesh, level, away)
+        fine, coarse = min(level, goal), max(level, goal)
+        levels = mesh.shape.levels
+        parents = levels[coarse - 1].parents
+        if fine:
+            parents = parents[levels[fine - 1].first]
+        one, other = self._carry(mesh, fine, away), self._carry(mesh, coarse, away)
+        moved = np.float32(share if goal == coarse else 1 - share)
+        arrays = [
+            before + moved * (after[parents] - before)
+            for before, after in (
+                (one.positions, other.positions),
+                (one.normals, other.normals),
+                (one.light, other.light),
+                (one.shape.looks, other.shape.looks),
+            )
+        ]
+        return replace(one, positions=arrays[0], normals=arrays[1], light=arrays[2], looks=arrays[3])
+
+    def _carry(self, mesh: FaceMesh, number: int, away: float) -> FaceMesh:
+        """Return a part of a face at a level of detail, moved by the vertices of the full one."""
+        if not number:
+            return replace(mesh, away=away)
+        level = mesh.shape.levels[number - 1]
+        before = self._lights.get(level.shape)
+        if before is None or not share_memory(before[0], mesh.light):
+            before = mesh.light, _mean(mesh.light, level.rows, level.weights)
+            self._lights[level.shape] = before
+        normals = _mean(mesh.normals, level.rows, level.weights)
+        positions = _mean(mesh.positions, level.rows, level.weights)
+        positions += level.heights[:, None] * normals
+        return replace(
+            mesh, shape=level.shape, positions=positions, normals=normals, light=before[1], away=away
+        )
 
     def _choose(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
         coarser = mesh.shape.coarser
@@ -84,6 +183,39 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
         coarser=None,
     )
     return _Level(coarser, rows.astype(np.intp))
+
+
+def _faces(meshes: list[FaceMesh]) -> list[list[int]]:
+    """Return, for each face with levels of detail, the numbers of its parts among the meshes."""
+    faces: list[list[int]] = []
+    whole, names = None, set[str]()
+    for number, mesh in enumerate(meshes):
+        if not mesh.shape.levels or not len(mesh.positions):
+            continue
+        level = mesh.shape.levels[0].whole
+        if level is not whole or mesh.shape.name in names:  # another face, or the same once more
+            faces.append([])
+            whole, names = level, set()
+        names.add(mesh.shape.name)
+        faces[-1].append(number)
+    return faces
+
+
+@compiled
+def _mean(values: Float32, rows: Int32, weights: Float32) -> Float32:
+    """Return the weighted means (M, C) of rows (M, 3) of values (V, C).
+
+    IndexError where a row is none of the values.
+    """
+    result = np.zeros((len(rows), values.shape[1]), dtype=np.float32)
+    for i in range(len(rows)):
+        for k in range(3):
+            row = rows[i, k]
+            if row < 0 or row >= len(values):
+                raise IndexError("a level of detail names a vertex that does not exist")
+            for j in range(values.shape[1]):
+                result[i, j] += weights[i, k] * values[row, j]
+    return result
 
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:

@@ -23,7 +23,7 @@ from fba_player.gl._resources import (
 from fba_player.gl._textures import Pictures, count_halvings
 from fba_player.view._view import FaceMesh, FaceShape
 
-CACHED_SHAPES = 64
+CACHED_SHAPES = 512
 """Number of parts whose buffers are cached; the least recently used goes first."""
 CORE_OPACITY = 0.9
 """Pixels of blended parts with at least this opacity are drawn first, as opaque, then the others."""
@@ -124,6 +124,9 @@ class FaceRenderer:
         if parts["lit"] is None or not share_memory(parts["lit"], mesh.light):
             parts["lit"] = mesh.light
             write_buffer(parts["light"], mesh.light)
+        if mesh.looks is not None or parts["looks"] is not None:  # while it morphs, and once after that
+            parts["looks"] = mesh.looks
+            write_buffer(parts["still"], shape.looks if mesh.looks is None else mesh.looks)
         away = distance(mesh, self._camera[0]) if mesh.away is None else mesh.away
         wide = self._camera[2] * away
         picture = parts["pictures"].choose(wide)
@@ -163,8 +166,6 @@ class FaceRenderer:
 
     def _upload(self, mesh: FaceMesh) -> dict[str, Any]:
         gl, shape, count = self._gl, mesh.shape, len(mesh.positions)
-        texcoords = shape.texcoords if shape.texcoords is not None else np.zeros((count, 2))
-        still = np.concatenate([shape.colours, texcoords, shape.sway[:, None]], axis=1)
         texel = 0.0
         if shape.wrinkle_places is not None:
             texel = texture_breadth(*_in_map(shape, mesh.positions)) / TEXELS
@@ -172,7 +173,7 @@ class FaceRenderer:
             "positions": gl.buffer(reserve=max(count, 1) * 12, dynamic=True),
             "normals": gl.buffer(reserve=max(count, 1) * 12, dynamic=True),
             "light": gl.buffer(reserve=max(count, 1) * 16, dynamic=True),
-            "still": make_buffer(gl, still),
+            "still": make_buffer(gl, shape.looks),
             "triangles": make_buffer(gl, shape.triangles, "i4"),
             "across": None if shape.across is None else make_buffer(gl, shape.across),
             "wrinkles": None if shape.wrinkle_places is None else make_buffer(gl, shape.wrinkle_places),
@@ -180,6 +181,7 @@ class FaceRenderer:
             "arrays": {},
             "pictures": Pictures(gl, shape, mesh.positions),
             "lit": None,
+            "looks": None,
         }
 
     def _wrinkle_map(self, mesh: FaceMesh, parts: dict[str, Any], wide: float) -> Any:

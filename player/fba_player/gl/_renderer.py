@@ -79,10 +79,16 @@ class Renderer:
         self._seen: tuple[object, ...] = ()
         set_uniform(self._programs["capsule"], "opacity", 1.0)
 
-    def draw(self, view: View, camera: Camera, size: tuple[int, int]) -> Steps:
+    @property
+    def morphing(self) -> bool:
+        """Whether a face of the last picture was changing from one level of detail to another."""
+        return self._details.morphing
+
+    def draw(self, view: View, camera: Camera, size: tuple[int, int], now: float | None = None) -> Steps:
         """Clear the bound framebuffer, draw the view, and return where its edges need smoothing.
 
-        size: width and height of the framebuffer in pixels.
+        size: width and height of the framebuffer in pixels. now: seconds, by which levels of detail change
+        gradually; None for a picture that does not depend on the one before.
         """
         gl = self._gl
         aspect = size[0] / max(size[1], 1)
@@ -101,7 +107,7 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        drawn = replace(view, faces=self._details.choose(view.faces, eye, pixel))
+        drawn = replace(view, faces=self._details.choose(view.faces, eye, pixel, view.lod, now))
         self._faces.begin(eye, matrix, pixel)
         self._faces.draw(drawn.faces)
         if view.extras is not None:

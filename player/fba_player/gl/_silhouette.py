@@ -18,7 +18,7 @@ TILE = 8
 """Size (pixels) of the tiles that are smoothed if an outline runs through them."""
 OUTLINE_MARGIN = 1.5
 """Pixels on each side of an outline that may need smoothing."""
-CACHED_SHAPES = 64
+CACHED_SHAPES = 512
 """Number of shapes whose edges are cached."""
 
 

@@ -80,7 +80,6 @@ class DisplayOptions:
         self._bones = bones
         self._wires = Wireframe()
         self._heatmap: FapHeatmap | None = None
-        self._full_shapes: WeakKeyDictionary[FaceShape, FaceShape] = WeakKeyDictionary()
         self._scale = figure.scale
 
     @cached_property
@@ -97,7 +96,7 @@ class DisplayOptions:
         """Return the view with the switches applied."""
         if not switches.changed:
             return view
-        view = self._hide_parts(view, switches)
+        view = replace(self._hide_parts(view, switches), lod=str(switches["lod"]))
         extras = Extras()
         number = switches["influence"]
         if number is not None:
@@ -107,7 +106,7 @@ class DisplayOptions:
             extras = replace(extras, legend=heatmap.legend)
         lines = []
         if switches["wireframe"] or switches["normals"]:
-            view = replace(view, faces=[self._at_full_detail(mesh) for mesh in view.faces])
+            view = replace(view, lod="0")  # lines lie on all triangles
         if switches["wireframe"]:
             lines.append(self._wires.edges(view.faces, view.meshes, view.eyes, self._scale))
         if switches["normals"]:
@@ -150,14 +149,6 @@ class DisplayOptions:
         lowest = float(self._figure.model.vertices[:, 1].min())
         step = 10.0 ** round(np.log10(max(self._scale, 1e-9)) - 1)
         return Grid(lowest, step, (x, z), step * 2 * GRID_REACH)
-
-    def _at_full_detail(self, mesh: FaceMesh) -> FaceMesh:
-        """Return the mesh without levels of detail, as lines lie on all its triangles."""
-        if mesh.shape.coarser is None:
-            return mesh
-        if mesh.shape not in self._full_shapes:
-            self._full_shapes[mesh.shape] = replace(mesh.shape, coarser=None)
-        return replace(mesh, shape=self._full_shapes[mesh.shape])
 
     def _fap_heatmap(self, number: int) -> FapHeatmap:
         if self._heatmap is None or self._heatmap.fap.number != number:

@@ -109,7 +109,14 @@ class FapHeatmap:
 def plain_colours(shape: FaceShape, colours: Float32) -> FaceShape:
     """Return the shape in these colours alone, without picture, relief and levels of detail."""
     return replace(
-        shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0), across=None, coarser=None
+        shape,
+        colours=colours,
+        picture=None,
+        scatter=0.0,
+        fine=(0.0, 1.0),
+        across=None,
+        coarser=None,
+        levels=(),
     )
 
 

@@ -85,10 +85,8 @@ class PointView:
         meshes = []
         for mesh in self._figure.meshes(faps, matrix, on_body=on_body, without=LEFT_OUT):
             if id(mesh.shape) not in self._dull_shapes:
-                colours = np.tile(np.array(DULL, dtype=np.float32), (len(mesh.positions), 1))
-                self._dull_shapes[id(mesh.shape)] = replace(
-                    mesh.shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0)
-                )
+                levels = tuple(replace(level, shape=_dull(level.shape)) for level in mesh.shape.levels)
+                self._dull_shapes[id(mesh.shape)] = replace(_dull(mesh.shape), levels=levels)
             meshes.append(replace(mesh, shape=self._dull_shapes[id(mesh.shape)]))
         return meshes
 
@@ -157,3 +155,9 @@ def _make_tubes(lines: list[tuple[str, int]], raised: float = 0.0) -> _Tubes:
         raised=raised,
     )
     return _Tubes(lengths, radii, shape)
+
+
+def _dull(shape: FaceShape) -> FaceShape:
+    """Return the shape in one dull colour."""
+    colours = np.tile(np.array(DULL, dtype=np.float32), (len(shape.colours), 1))
+    return replace(shape, colours=colours, picture=None, scatter=0.0, fine=(0.0, 1.0))

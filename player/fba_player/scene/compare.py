@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -182,7 +183,7 @@ class CompareScene(Timed[CompareTimeline]):
             shift = self._shift(number) + travelled - np.array(scene.travel(own_time))
             view = move_view(scene.view_at(own_time), shift)
             if self.names[number] and len(self.scenes) > 1:
-                head = scene.face_subject
+                head = self._heads[number]
                 x, y, z = head.centre
                 place = np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number)
                 extras = view.extras or Extras()
@@ -190,6 +191,11 @@ class CompareScene(Timed[CompareTimeline]):
                 view = replace(view, extras=replace(extras, dots=(*extras.dots, caption)))
             views.append(view)
         return join_views(views)
+
+    @cached_property
+    def _heads(self) -> list[Subject]:
+        """The head of each scene at the start."""
+        return [scene.face_subject for scene in self.scenes]
 
     def still(self, faps: Float32) -> View:
         """Return the first scene alone for FAPs (68,)."""

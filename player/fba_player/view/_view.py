@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from fba.arrays import Float32, Float64, Int32
+from fba.arrays import Float32, Float64, Int32, Intp
 from fba.mesh import Alpha
 from fba_player._mesh.textures import linear_light
 
@@ -67,10 +68,11 @@ class FaceShape:
     (V, 8) for single hairs: direction from the opposite vertex, half the hair's width (m), direction to the
     tip, and 1 or -1 for its side; hairs narrower than a pixel are drawn a pixel wide and fainter. closed:
     whether the inside is never visible and not drawn. name, kind: of the model's part, "" if none begins.
-    coarser: levels of detail for small sizes, None without any. smooth: False if triangles are so large
-    that light changes visibly within them. wrinkle_places: float32 (V, 2), where each vertex lies in
-    `fba_player._mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity, cutoff: as of
-    `fba.mesh._meshes.Material`.
+    coarser: levels of detail of a body's part, None without any; levels: those of a face's, from fine to
+    coarse. rest: float32 (V, 3), positions at rest of a part that casts a shadow on the ground. smooth: False
+    if triangles are so large that light changes visibly within them. wrinkle_places: float32 (V, 2), where
+    each vertex lies in `fba_player._mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity,
+    cutoff: as of `fba.mesh._meshes.Material`.
     """
 
     triangles: Int32
@@ -86,11 +88,19 @@ class FaceShape:
     name: str = ""
     kind: str = ""
     coarser: DetailLevels | None = None
+    levels: tuple[CoarseShape, ...] = ()
+    rest: Float32 | None = None
     smooth: bool = True
     wrinkle_places: Float32 | None = None
     alpha: Alpha = "auto"
     opacity: float = 1.0
     cutoff: float = 0.5
+
+    @property
+    def looks(self) -> Float32:
+        """float32 (V, 7): colours, texture coordinates and sway."""
+        texcoords = np.zeros((len(self.sway), 2)) if self.texcoords is None else self.texcoords
+        return np.concatenate([self.colours, texcoords, self.sway[:, None]], axis=1).astype(np.float32)
 
     @property
     def see_through(self) -> bool:
@@ -102,6 +112,32 @@ class FaceShape:
 
 
 @dataclass(frozen=True, eq=False)
+class CoarseShape:
+    """A part of a face at a level of detail: a coarser shape, moved by the vertices of the full one.
+
+    rows: int32 (M, 3), and weights: float32 (M, 3): vertices of the full part between which each of the M
+    lies; heights: float32 (M,), how far above them along the normal (m). parents: int32 (V,), the vertex that
+    stands for each of the full part's. error: that of the whole face (m). whole: the level of the whole face,
+    which its parts share.
+    """
+
+    shape: FaceShape
+    rows: Int32
+    weights: Float32
+    heights: Float32
+    parents: Int32
+    error: float
+    whole: object
+
+    @cached_property
+    def first(self) -> Intp:
+        """(M,): a vertex of the full part that each of the M stands for."""
+        first = np.zeros(len(self.heights), dtype=np.intp)
+        first[self.parents[::-1]] = np.arange(len(self.parents))[::-1]
+        return first
+
+
+@dataclass(frozen=True, eq=False)
 class FaceMesh:
     """A part of a face in one pose.
 
@@ -110,7 +146,8 @@ class FaceMesh:
     from behind, rim light. matrix: (4, 4), into the world. turn: (3,), the axis of the head's rotation times
     its angle, about `centre` (3,), in the frame of the positions. away: distance from the camera that the
     mesh is drawn for, in the mesh's own unit; None if not known. wrinkles: float32 (2, 4), 0..1, strength of
-    each wrinkle on the left and the right side; None for none. Do not write to the arrays: renderers
+    each wrinkle on the left and the right side; None for none. looks: `FaceShape.looks` in place of the
+    shape's own, while one level of detail becomes another. Do not write to the arrays: renderers
     recognise by their identity what they have uploaded.
     """
 
@@ -123,6 +160,7 @@ class FaceMesh:
     centre: Float64
     away: float | None = None
     wrinkles: Float32 | None = None
+    looks: Float32 | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +259,8 @@ class View:
     capsules: float32 (N, 16), see `CAPSULE_FLOATS`. marks: likewise, but they show faintly through surfaces
     that hide them. blobs: float32 (K, 4), soft shadows on the ground: x, z, radius, darkness. ground: whether
     there is a ground. background: colour behind everything (sRGB, 0..1) instead of the studio. extras:
-    annotations drawn over the figure.
+    annotations drawn over the figure. lod: the level of detail of faces, "auto" by size, or a number, 0 for
+    all triangles, also of bodies.
     """
 
     meshes: list[Mesh] = field(default_factory=list)
@@ -233,6 +272,7 @@ class View:
     ground: bool = False
     background: tuple[float, float, float] | None = None
     extras: Extras | None = None
+    lod: str = "auto"
 
 
 def spheres(centres: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:

@@ -272,7 +272,10 @@ class Window(Closing):
         self.captures.begin_picture()
         time = self.transport.time
         self._target.begin()
-        within = self._renderer.draw(session.view(time), session.camera(time), size)
+        gradual = wall.perf_counter() if session.recording is None else None  # films need no clock
+        within = self._renderer.draw(session.view(time), session.camera(time), size, gradual)
+        if self._renderer.morphing:
+            self._pictures_due = max(self._pictures_due, 1)
         self._target.finish(self._gl.screen, within)
         self.captures.add_picture(lambda: self._start_reading(size))
         self._handle_requests()

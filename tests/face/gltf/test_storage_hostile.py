@@ -129,6 +129,8 @@ LEVELS: list[tuple[str, Any, str]] = [
     ("/0/model", 10**6, r"levels\[0\].model: 1000000 is not within"),
     ("/0/parents", REMOVED, r"levels\[0\]: 'parents' is missing"),
     ("/0/parents", 0, r"levels\[0\].parents: "),
+    ("/0/error", REMOVED, r"levels\[0\]: 'error' is missing"),
+    ("/0/error", -1, "level 1: its error -1"),
 ]
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fba.compiled import is_compiled
-from fba.mesh.simplify import DetailLevels
 from fba_player._mesh.primitives import sphere_mesh
 from fba_player.gl._ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
 from fba_player.view._view import FaceMesh, FaceShape
@@ -26,7 +25,7 @@ def ball(radius: float, centre: tuple[float, float, float]) -> FaceMesh:
         triangles.astype(np.int32),
         np.zeros((count, 4), np.float32),
         np.ones(count, np.float32),
-        coarser=DetailLevels(places, 1, triangles.astype(np.int32)),
+        rest=places,
     )
     matrix = np.eye(4)
     matrix[:3, 3] = centre

@@ -322,3 +322,17 @@ def test_the_close_button_of_the_window_asks_if_work_is_unsaved(window: Window) 
     assert [notice.kind for notice in window.session.notices()] == ["warning"]
     glfw.set_window_should_close(window._window, True)
     assert not window.update()
+
+
+def test_a_paused_face_changes_its_level_of_detail_and_then_comes_to_rest(plain: Window) -> None:
+    plain.transport.pause()
+    settle(plain)
+    plain.session.scene.show("lod", "0")  # so small, it is at a coarse one
+    plain._redraw()
+    until(plain, lambda: plain._renderer is not None and plain._renderer.morphing)
+    settle(plain)
+    assert plain._renderer is not None
+    assert not plain._renderer.morphing
+    pictures = plain.pictures
+    plain.update()
+    assert plain.pictures == pictures
