@@ -61,8 +61,8 @@ _NAMES = {
 }  # fmt: skip
 """Public names by the module that they are imported from."""
 _MODULES = (
-    "archive", "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live", "parameters",
-    "persona", "planning", "player", "serving",
+    "archive", "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live", "outlines",
+    "parameters", "persona", "planning", "player", "serving",
 )  # fmt: skip
 
 __all__ = [

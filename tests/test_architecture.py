@@ -31,6 +31,7 @@ fba.geometry
 fba.parameters
 fba
 fba.mesh
+fba.mesh.simplify
 fba.gltf
 fba.codec.settings
 fba.codec._plane
@@ -41,6 +42,7 @@ fba.carriage
 fba.face.interpolation
 fba.face
 fba.face.deform
+fba.face.simplification
 fba.face.learning
 fba.face.gltf
 fba.face.builtin
@@ -75,6 +77,7 @@ fba.capture.points
 fba.capture
 fba.capture.live
 fba.emotion
+fba.outlines
 fba.formats
 fba.formats.text
 fba.formats.epf
@@ -85,6 +88,7 @@ fba.formats.c3d
 fba.formats.gltf
 fba.formats.face_tables
 fba.formats.avatar
+fba.face.fitting
 fba.live._protocols
 fba.live
 fba.archive
@@ -116,6 +120,7 @@ fba.cli.coding
 fba.cli.subcommands
 fba.cli.commands
 fba.cli.commands.live
+fba.cli.commands.archives
 fba.__main__
 """
 FLOORS = _FLOORS.split()

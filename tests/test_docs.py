@@ -45,6 +45,7 @@ COMMAND = re.compile(r"^\s*(\$ |fba |\./dev|python3? |pip |cd |import |from \w+ 
 WINDOW = "opens a window, which stays until somebody closes it"
 ARRIVING = "waits for a stream that arrives over a network"
 SENT = "receives what a telephone sends"
+STORAGE = "needs a storage of S3's kind"
 SYSTEM = "installs system packages"
 CHECKOUT = "sets up or tests the checkout, which .ci/run does"
 MISMATCH = "fba: walk.fba: BAP steps visage: the stream says so"
@@ -65,6 +66,7 @@ ILLUSTRATIONS = {
     ("docs/capture-live.md", "fba capture livelink --serve 8080 -o face.fba"): SENT,
     ("docs/capture-live.md", "fba serve hello.fba --loop"): "serves until somebody ends it",
     ("docs/live.md", "fba play rtp://0.0.0.0:5004"): WINDOW,
+    ("docs/live.md", "fba capture livelink -o - | fba send - --live rtp://192.168.0.20:5004"): SENT,
     ("docs/live.md", "fba capture rtp://0.0.0.0:5004 -o talk.fba"): ARRIVING,
     (
         "docs/live.md",
@@ -72,7 +74,12 @@ ILLUSTRATIONS = {
     ): "watches a network; tests/carriage runs tshark",
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/carriage.md", "fba play hello.fba.mp4"): WINDOW,
+    (
+        "docs/archives.md",
+        "fba archive make streams/ --folders subject,emotion -o s3://training/faces",
+    ): STORAGE,
     ("docs/cluster.md", "dask scheduler --host 10.0.0.1"): "needs several machines",
+    ("docs/cluster.md", "fba archive make streams/ -o s3://training/faces"): STORAGE,
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "./dev bounds"): "takes hours; .ci/run runs a part, tests/fuzz the command",
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",
@@ -97,8 +104,12 @@ ILLUSTRATIONS = {
     ): "takes minutes; tests/persona has fewer contents",
     ("docs/persona.md", "python -m tools.persona.blind_test"): "takes minutes; tests/persona has fewer takes",
     ("docs/persona.md", "python -m tools.persona.training -o default.recogniser"): "trains for a minute",
+    (
+        "docs/photos.md",
+        "$ fba model photos front.jpg side.jpg -o me.glb --edit me.points.json",
+    ): WINDOW,
     ("docs/play.md", "fba play face.fba"): WINDOW,
-    ("docs/play.md", "fba play face.fba --paused"): WINDOW,
+    ("docs/play.md", "fba play"): WINDOW,
     ("docs/play.md", "fba play face.fba --audio voice.mp3 --audio-offset -0.04"): WINDOW,
     ("docs/play.md", "fba play hello.fap small.fba"): WINDOW,
     ("docs/play.md", "nc host 7000 | fba play -"): ARRIVING,

@@ -12,6 +12,7 @@ written by the package pyarrow, queries are answered by duckdb: the extra `archi
 from fba.archive._batch import RECORD, Conversion, convert_batch
 from fba.archive._cluster import for_each_on
 from fba.archive._index import Indexed, index_archive, query
+from fba.archive._locations import Location, RemotePath, find_location
 from fba.archive._making import (
     Check,
     Report,
@@ -38,8 +39,10 @@ __all__ = [
     "Conversion",
     "Indexed",
     "Kind",
+    "Location",
     "Outcome",
     "Performance",
+    "RemotePath",
     "Report",
     "Source",
     "Windows",
@@ -48,6 +51,7 @@ __all__ = [
     "count_processors",
     "describe_archive",
     "extract",
+    "find_location",
     "find_sources",
     "for_each",
     "for_each_on",

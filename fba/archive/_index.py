@@ -6,13 +6,12 @@ import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from fba.archive._description import describe
+from fba.archive._locations import Location, find_location, written
 from fba.archive._pool import for_each
-from fba.archive._shards import Archive, arrow_errors, import_pyarrow
-from fba.atomic import atomic
+from fba.archive._shards import Archive, arrow_errors, import_pyarrow, open_parquet
 from fba.errors import FbaError, FormatError, OptionError, did_you_mean, warn
 
 INDEX = "index.parquet"
@@ -61,10 +60,10 @@ def index_archive(
     """
     pa = import_pyarrow()
     archive = Archive(folder)
-    path = Path(folder) / INDEX
+    path = archive.folder / INDEX
     earlier = {row["key"]: row for row in _read(path).to_pylist()} if path.is_file() else {}
     rows: list[dict[str, Any]] = []
-    wanted: list[tuple[Path, int, frozenset[str]]] = []
+    wanted: list[tuple[Location, int, frozenset[str]]] = []
     new: dict[tuple[int, int], set[str]] = {}
     for place, cells in archive.cells(["key"]):
         row = earlier.get(cells["key"])
@@ -83,12 +82,14 @@ def index_archive(
                 rows.append(described)
             yield Indexed(name, error)
     rows.sort(key=lambda row: str(row["name"]))
-    with atomic(path) as file:
+    with written(path) as file:
         table = pa.Table.from_pylist(rows, _schema())
         pa.parquet.write_table(table, pa.PythonFile(file, "w"), compression="ZSTD", write_page_checksum=True)
 
 
-def _describe_group(item: tuple[Path, int, frozenset[str]]) -> list[tuple[str, dict[str, Any] | None, str]]:
+def _describe_group(
+    item: tuple[Location, int, frozenset[str]],
+) -> list[tuple[str, dict[str, Any] | None, str]]:
     """Return the rows of performances of a row group, by name, or the reason of a failure."""
     path, group, keys = item
     found: list[tuple[str, dict[str, Any] | None, str]] = []
@@ -101,11 +102,10 @@ def _describe_group(item: tuple[Path, int, frozenset[str]]) -> list[tuple[str, d
     return found
 
 
-def _read(path: Path) -> Any:
+def _read(path: Location) -> Any:
     """Return an index, as a pyarrow table. Raises FormatError for another file."""
-    pa = import_pyarrow()
     with arrow_errors(path):
-        file = pa.parquet.ParquetFile(path, page_checksum_verification=True, pre_buffer=False)
+        file = open_parquet(path)
         with file:
             found = file.schema_arrow
             groups = [file.metadata.row_group(number) for number in range(file.num_row_groups)]
@@ -144,12 +144,12 @@ def query(
         raise FbaError(
             'archives are searched by the package duckdb: pip install "mpeg4-fba[archive]"'
         ) from None
-    path = Path(folder) / INDEX
+    path = find_location(folder) / INDEX
     if not path.is_file():
         Archive(folder)  # raises the error of a folder that is no archive
         raise FormatError("has no index yet; make one with `fba archive index`", path=folder)
     table = _read(path)
-    _warn_of_missing(Path(folder), set(table.column("key").to_pylist()))
+    _warn_of_missing(folder, set(table.column("key").to_pylist()))
     chosen = ", ".join(_quoted(name, table) for name in columns) if columns else "*"
     text = f"SELECT {chosen} FROM performances WHERE (\n{condition}\n)"
     if sort is not None:
@@ -198,7 +198,7 @@ def _quoted(name: str, table: Any) -> str:
     return f'"{name}"'
 
 
-def _warn_of_missing(folder: Path, keys: set[str]) -> None:
+def _warn_of_missing(folder: str | os.PathLike[str], keys: set[str]) -> None:
     missing = sum(cells["key"] not in keys for _, cells in Archive(folder).cells(["key"]))
     if missing:
         warn(

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
+from fba.archive._locations import Location, find_location, make_folder, size_of
 from fba.archive._performance import (
     MOST_BYTES,
     UNITS,
@@ -22,7 +23,7 @@ from fba.archive._performance import (
 from fba.archive._pool import Outcome, for_each
 from fba.archive._shards import SHARD_BYTES, SHARD_ROWS, Archive, find_shards, next_number, write_shard
 from fba.archive._sources import Source
-from fba.atomic import atomic, write_error
+from fba.atomic import atomic
 from fba.errors import FbaError, FormatError, LimitError
 from fba.source import read_whole
 
@@ -56,7 +57,8 @@ def make_archive(
 ) -> Iterator[Report]:
     """Write performances into shards in a folder; yield a report on each file, while the work goes on.
 
-    sources: of `find_sources`. coding: how files become streams. sound: of sound files beside them, their
+    sources: of `find_sources`. folder: a path, or an address that the package fsspec opens, such as
+    "s3://bucket/archive". coding: how files become streams. sound: of sound files beside them, their
     names, their bytes too, or nothing. units: metres of a face that FAPs are scaled by; default: those of
     the built-in head. shard_bytes: size from which a new shard begins. jobs: number of processes.
 
@@ -67,11 +69,8 @@ def make_archive(
 
     Raises FormatError where a shard cannot be written, and FbaError without the package pyarrow.
     """
-    target = Path(folder)
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise write_error(target, error, "cannot be made") from error
+    target = find_location(folder)
+    make_folder(target)
     shards = find_shards(target)
     known: dict[str, str] = {}
     if shards:
@@ -176,7 +175,7 @@ def describe_archive(archive: Archive) -> dict[str, Any]:
             labels.setdefault(name, set()).add(value)
     return {
         "shards": len(archive.shards),
-        "bytes": sum(path.stat().st_size for path in archive.shards),
+        "bytes": sum(map(size_of, archive.shards)),
         "performances": performances,
         "seconds": round(seconds, 3),
         "frames": frames,
@@ -202,16 +201,13 @@ def extract(archive: Archive, names: Sequence[str], folder: str | os.PathLike[st
             written.append((performance.sound_name, performance.sound))
         for name, data in written:
             path = _inside(root, name, archive.folder)
-            try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise write_error(path.parent, error, "cannot be made") from error
+            make_folder(path.parent)
             with atomic(path) as file:
                 file.write(data)
             yield path
 
 
-def _inside(root: Path, name: str, archive: Path) -> Path:
+def _inside(root: Path, name: str, archive: Location) -> Path:
     """Return the path of a name below a folder. Raises FormatError for one that leads elsewhere."""
     parts = PurePosixPath(name).parts
     bad = not parts or name.startswith("/") or any(part in ("..", ".") for part in parts)
@@ -232,7 +228,7 @@ class Check:
     name: of the performance; "" for a part of a shard. faults: what is wrong; empty if nothing is.
     """
 
-    shard: Path
+    shard: Location
     name: str
     faults: tuple[str, ...]
 
@@ -245,10 +241,10 @@ def verify_archive(
     Every stream is decoded and compared with its digest and its row; decoding is begun at every place that
     the row lists. A name that two rows have is a fault. begun: called with the number of row groups.
     """
-    shards = find_shards(Path(folder))
+    shards = find_shards(find_location(folder))
     if not shards:
         Archive(folder)  # raises the error
-    items: list[tuple[Path, int]] = []
+    items: list[tuple[Location, int]] = []
     for path in shards:
         try:
             items += [(path, group) for group in range(Archive(path.parent, shards=[path]).groups[0])]
@@ -266,7 +262,7 @@ def verify_archive(
             yield replace(check, faults=check.faults + twice)
 
 
-def _check_group(item: tuple[Path, int]) -> list[Check]:
+def _check_group(item: tuple[Location, int]) -> list[Check]:
     path, group = item
     performances = Archive(path.parent, shards=[path]).group(0, group, sound=True)
     return [Check(path, one.name, tuple(check_performance(one))) for one in performances]

@@ -13,8 +13,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from fba.archive._locations import Location, RemotePath, find_location, written
 from fba.archive._performance import MOST_BYTES, UNITS, Performance
-from fba.atomic import atomic, write_error
+from fba.atomic import write_error
 from fba.errors import FbaError, FormatError, LimitError, did_you_mean
 from fba.parameters import BAP_STEP_TABLES
 
@@ -76,7 +77,7 @@ def _cells(performance: Performance) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def write_shard(folder: Path, number: int, performances: Sequence[Performance]) -> Path:
+def write_shard(folder: Location, number: int, performances: Sequence[Performance]) -> Location:
     """Write performances as a shard, whole or not at all; return its path.
 
     Its name has its number and a digest of the keys of its rows. Raises FormatError where it cannot be
@@ -87,7 +88,7 @@ def write_shard(folder: Path, number: int, performances: Sequence[Performance]) 
     path = folder / f"shard-{number:05}-{named}.parquet"
     columns = schema()
     try:
-        with atomic(path) as file:
+        with written(path) as file:
             writer = pa.parquet.ParquetWriter(
                 pa.PythonFile(file, "w"), columns, compression=_compression(columns.names),
                 use_dictionary=["subject", "rate_exact", "bap_steps"], write_page_checksum=True,
@@ -131,18 +132,19 @@ class Place:
 class Archive:
     """The performances of an archive: an iterable, whose `len` is their number.
 
-    folder: with shards. shards: those to read; default: all in the folder. groups: numbers of row groups in
-    each. `archive["anna/take1"]` is the performance of a name. It pickles, and may be used in a forked
-    process. Row groups that were read are kept, up to 64 MiB.
+    folder: with shards, or its address, "s3://bucket/archive" or another that the package fsspec opens.
+    shards: those to read; default: all in the folder. groups: numbers of row groups in each.
+    `archive["anna/take1"]` is the performance of a name. It pickles, and may be used in a forked process. Row
+    groups that were read are kept, up to 64 MiB.
 
     Raises FormatError for a folder without shards, for a shard that is damaged or another program's, and for
     a name that is not there; FbaError without the package pyarrow.
     """
 
-    def __init__(self, folder: str | os.PathLike[str], *, shards: Sequence[Path] | None = None) -> None:
+    def __init__(self, folder: str | os.PathLike[str], *, shards: Sequence[Location] | None = None) -> None:
         import_pyarrow()
-        self.folder = Path(folder)
-        self.shards = find_shards(self.folder) if shards is None else list(shards)
+        self.folder = find_location(folder)
+        self.shards: list[Location] = find_shards(self.folder) if shards is None else list(shards)
         if not self.shards:
             raise FormatError(
                 f"holds no shards ({PATTERN}); `fba archive make` writes them", path=self.folder
@@ -239,39 +241,57 @@ class Archive:
         return self._files[shard]
 
 
-def find_shards(folder: Path) -> list[Path]:
-    """Return the shards in a folder, in the order of their names. Raises FormatError without the folder."""
-    if not folder.is_dir():
+def find_shards(folder: Location) -> list[Location]:
+    """Return the shards in a folder, in the order of their names. Raises FormatError without the folder.
+
+    Elsewhere there may be no folders: they are but the beginnings of names.
+    """
+    if isinstance(folder, Path) and not folder.is_dir():
         raise FormatError("there is no such folder; check its name", path=folder)
     return sorted(folder.glob(PATTERN))
 
 
-def next_number(shards: Sequence[Path]) -> int:
+def next_number(shards: Sequence[Location]) -> int:
     """Return the number of the next shard."""
     numbers = [int(match[1]) for path in shards if (match := re.match(r"shard-(\d+)", path.name))]
     return max(numbers, default=-1) + 1
 
 
 @contextmanager
-def arrow_errors(path: Path) -> Iterator[None]:
-    """Turn pyarrow's errors into a FormatError about a file."""
+def arrow_errors(path: Location) -> Iterator[None]:
+    """Turn errors of pyarrow, and of storages elsewhere, into a FormatError about a file."""
     pa = import_pyarrow()
+    damage = (pa.ArrowException, OSError, ValueError, KeyError, IndexError, OverflowError)
     try:
         yield
-    except (pa.ArrowException, OSError, ValueError, KeyError, IndexError, OverflowError) as error:
+    except Exception as error:
         if isinstance(error, FbaError):
             raise
         reason = " ".join(str(error).split())[:200]
+        if isinstance(path, RemotePath):
+            raise FormatError(
+                f"cannot be read, or is damaged, or is no Parquet file ({reason or type(error).__name__})",
+                path=path,
+            ) from error
+        if not isinstance(error, damage):
+            raise
         raise FormatError(
             f"is damaged, or no Parquet file ({reason}); make it again, or copy it again", path=path
         ) from error
 
 
-def _opened(path: Path) -> Any:
+def open_parquet(path: Location) -> Any:
+    """Return a Parquet file, opened; its pages are compared with their checksums."""
+    source, kept = path.open() if isinstance(path, RemotePath) else (path, None)
+    file = import_pyarrow().parquet.ParquetFile(source, page_checksum_verification=True, pre_buffer=False)
+    file.kept = kept
+    return file
+
+
+def _opened(path: Location) -> Any:
     """Return a shard, opened. Raises FormatError for damage, another program's file and missing columns."""
-    pa = import_pyarrow()
     with arrow_errors(path):
-        file = pa.parquet.ParquetFile(path, page_checksum_verification=True, pre_buffer=False)
+        file = open_parquet(path)
         found = file.schema_arrow
     wanted = schema()
     if (found.metadata or {}).get(MARK) is None:
@@ -295,7 +315,7 @@ def _opened(path: Path) -> Any:
     return file
 
 
-def _performance(cells: dict[str, Any], path: Path, group: int, row: int) -> Performance:
+def _performance(cells: dict[str, Any], path: Location, group: int, row: int) -> Performance:
     """Return the performance of a row. Raises FormatError for cells that contradict each other."""
     where = f"row {row} of row group {group}"
 

@@ -28,10 +28,10 @@ _FACE: tuple[Kind, ...] = ("faps", "arkit", "points")
 class Windows(Sequence[Float32]):
     """Windows of the performances of an archive: a sequence of float32 arrays, each of `frames` frames.
 
-    folder: of an archive. frames: of a window. stride: frames from the beginning of a window to that of the
-    next in the same performance; default: `frames`, so that windows do not overlap; 1 for all there are.
-    Frames that do not fill a window at the end of a performance, and performances without the part or with
-    fewer frames, are left out.
+    folder: of an archive, or its address, as of `Archive`. frames: of a window. stride: frames from the
+    beginning of a window to that of the next in the same performance; default: `frames`, so that windows do
+    not overlap; 1 for all there are. Frames that do not fill a window at the end of a performance, and
+    performances without the part or with fewer frames, are left out.
 
     as_: what a window is.
         "faps": (frames, 68), the FAPs that a face shows, in FAPU as the standard has them

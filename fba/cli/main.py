@@ -31,6 +31,7 @@ _COMMANDS = {
     "serve": "Show files, or a stream while it arrives, in browsers.",
     "render": "Render a file to a picture or a video, without a window.",
     "archive": "Keep many performances in a few Parquet files, draw windows from them, search them.",
+    "find": "Find the performance, the frame and the side that the outline of a figure in a picture shows.",
     "verify": "Check FBA streams for damage, and compute digests of their values.",
     "stats": "Show where the bits of FBA streams go.",
     "conformance": "Check this codec, or another program, against test vectors.",
@@ -40,12 +41,18 @@ _COMMANDS = {
     "emote": "Play a performance in a mood: angry, surprised, sad, sleepy, happy and others.",
     "emotion": "Read the expressions of a face from any file with FAPs.",
     "markers": "Let captured markers move any head: map them onto it, play, export.",
-    "model": "Inspect face models, check them, import them, fit them to a person.",
+    "model": "Inspect face models, check them, import, fit and simplify them.",
     "persona": "Learn how an actor moves the face, and play another person's performance so.",
     "demo": "Encode the sample animation, print its size, and play it.",
 }
-_LIVE = ("capture", "send", "serve")
-"""Subcommands in the folder `live`."""
+_FOLDERS = {
+    "capture": "live.",
+    "send": "live.",
+    "serve": "live.",
+    "archive": "archives.",
+    "find": "archives.",
+}
+"""Subcommands in folders."""
 
 BAD_DATA, BAD_USAGE = 1, 2
 """Exit codes."""
@@ -113,7 +120,7 @@ class _Commands(Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
-        folder = "live." if cmd_name in _LIVE else ""
+        folder = _FOLDERS.get(cmd_name, "")
         command: click.Command = import_module(f"fba.cli.commands.{folder}{cmd_name}").command
         return command
 

@@ -44,6 +44,14 @@ def _parse_show(text: str) -> tuple[str, Any]:
     return parse_switch(text)
 
 
+def _parse_camera(text: str) -> Any:
+    from fba.player import Camera
+
+    return text if text in Camera.presets else Camera.parse(text)
+
+
+CAMERA = options.TextType("camera", _parse_camera)
+"""A camera: the name of a view, or its place in numbers."""
 SHOW = options.TextType("switch", _parse_show)
 """A switch of the player: wireframe, influence=open_jaw, shadows=off."""
 files_argument = click.argument("files", type=options.EXISTING, nargs=-1, metavar="[FILE...]")
@@ -74,8 +82,20 @@ class SceneOptions(Reading):
     arrange: Literal["side", "over"] | None = option(
         help="Several files: side by side (default), or the others as drawings over the first."
     )
-    camera: Literal["front", "three-quarter", "profile", "body"] | None = option(
-        help="Default: one that suits the content."
+    camera: Any = option(
+        type=CAMERA,
+        metavar="VIEW",
+        help="Of the face: front, three-quarter, profile or face; of the whole figure: body, side, back or "
+        "top; or turn=35,tilt=5,distance=1.2,at=0:1.6:0,angle=24 in degrees and metres. Default: one that "
+        "suits the content.",
+    )
+    follow: Literal["hips", "head", "none"] | None = option(
+        help="What the camera follows. Default: the head in views of the face, else a figure that walks away."
+    )
+    orbit: float | None = option(
+        type=click.FloatRange(1.0, 3600.0),
+        metavar="SECONDS",
+        help="Let the camera turn around the figure, once in this time.",
     )
     view: Literal["figure", "points"] = option(
         default="figure", help="A person, or the face as its feature points and the body as its bones."
@@ -211,6 +231,7 @@ def build_scene(
         result = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
     for switch, state in how.shows:
         result.show(switch, state)
+    result.follow, result.orbit = how.follow, how.orbit
     return result
 
 

@@ -80,7 +80,8 @@ class FaceModel(Meshes[Part]):
     head, the thickness of hair). tables: the effect of each FAP, each FAP at most once. fit: how unsent
     FAPs follow from sent ones, or None for the standard's mates. definitions: the FAPs of visemes and
     expressions. lost: FAPs without tables and why, by number. notes: origin, licence and the like. wrinkles:
-    whether players draw wrinkles on the skin as FAPs move it; drawn faces look wrong with them.
+    whether players draw wrinkles on the skin as FAPs move it; drawn faces look wrong with them. levels:
+    coarser faces for small sizes on the screen, from fine to coarse; see `fba.face.simplification`.
 
     Axes: +x the subject's left, +y up, +z forward. Raises ModelError naming the part, point or FAP that is
     wrong.
@@ -96,6 +97,7 @@ class FaceModel(Meshes[Part]):
     lost: Mapping[int, str] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
     wrinkles: bool = False
+    levels: tuple[DetailLevel, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parts", tuple(self.parts))
@@ -115,6 +117,9 @@ class FaceModel(Meshes[Part]):
                 )
         object.__setattr__(self, "lost", dict(self.lost))
         object.__setattr__(self, "notes", dict(self.notes))
+        object.__setattr__(self, "levels", tuple(self.levels))
+        for number, level in enumerate(self.levels):
+            level.check(self, f"level {number + 1}")
         _ = self.fapu  # raises ModelError for a face without units
 
     @staticmethod
@@ -168,7 +173,7 @@ class FaceModel(Meshes[Part]):
 
     def with_tables(self, tables: tuple[FaceDefTables, ...], lost: Mapping[int, str]) -> FaceModel:
         """Return the same face with other tables."""
-        return replace(self, tables=tables, lost=lost)
+        return replace(self, tables=tables, lost=lost, levels=())
 
     def with_notes(self, notes: Mapping[str, str]) -> FaceModel:
         """Return the same face with more notes."""
@@ -226,6 +231,33 @@ class FaceModel(Meshes[Part]):
             for transform in table.transforms:
                 if transform.part != HEAD and transform.part not in sizes:
                     raise ModelError(f"{where}: there is no part {transform.part!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class DetailLevel:
+    """A coarser face of the same parts, and how it belongs to the full one.
+
+    parents: int32 (V,), the vertex of `model` that stands for each of the full face's; read-only.
+    """
+
+    model: FaceModel
+    parents: Int32
+
+    def __post_init__(self) -> None:
+        parents = np.array(self.parents, dtype=np.int32)
+        parents.flags.writeable = False
+        object.__setattr__(self, "parents", parents)
+
+    def check(self, full: FaceModel, where: str) -> None:
+        """Raise ModelError where this is no level of a face."""
+        if self.model.levels:
+            raise ModelError(f"{where}: a level of detail has no levels itself")
+        if [part.name for part in self.model.parts] != [part.name for part in full.parts]:
+            raise ModelError(f"{where}: its parts are not those of the face")
+        if self.parents.shape != (len(full.vertices),):
+            raise ModelError(f"{where}: {len(full.vertices)} parents are needed, not {self.parents.shape}")
+        if len(self.parents) and not 0 <= self.parents.min() <= self.parents.max() < len(self.model.vertices):
+            raise ModelError(f"{where}: parents beyond its {len(self.model.vertices)} vertices")
 
 
 def bind(parts: tuple[Part, ...], points: npt.ArrayLike, most: float) -> Int32:

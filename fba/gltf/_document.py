@@ -88,6 +88,13 @@ class Document:
             )
         return buffer[offset : offset + length]
 
+    def embedded(self, reference: Value, name: str) -> Document:
+        """Return the document in a buffer view; it names no files and shares the budget. name: for errors."""
+        data, entry = self.view(reference)
+        self.budget.charge(len(data), entry)
+        inner = parse_document(bytes(data), f"{self.root.file}: {name}", None, self.budget.limits)
+        return Document(inner.root, inner.buffers, None, self.budget)
+
     def resource(self, uri: Value, most: int = MAX_BYTES) -> bytes:
         """Return the content of a data URI or a file beside the document; ModelError beyond `most` bytes."""
         if not isinstance(uri.data, str):

@@ -21,14 +21,14 @@ class Budget:
     """
 
     def __init__(self, limits: Limits, source: int) -> None:
-        self._limits, self._source = limits, source
+        self.limits, self._source = limits, source
         self._used = 0
 
     def charge(self, amount: int, where: Value) -> None:
         """Count `amount` bytes, before they are allocated; LimitError where that is too much."""
         self._used += max(amount, 256)  # even an empty array or object takes this much
         place = f"{where.file}: {where.path}" if where.path else where.file
-        self._limits.check_bytes(self._used, f"{place}: what the file unpacks to", source=self._source)
+        self.limits.check_bytes(self._used, f"{place}: what the file unpacks to", source=self._source)
 
     def add_source(self, size: int) -> None:
         """Count the bytes of another file that the file names."""
@@ -36,7 +36,7 @@ class Budget:
 
     def copy(self) -> Budget:
         """Return a budget that has used as much, for one of several results made from the file."""
-        copied = Budget(self._limits, self._source)
+        copied = Budget(self.limits, self._source)
         copied._used = self._used
         return copied
 

@@ -84,12 +84,18 @@ class Builder:
     def matrices(self, values: npt.ArrayLike) -> int:
         """Add matrices (N, 4, 4), in a buffer view of their own; return the accessor."""
         array = _native(np.swapaxes(np.asarray(values, dtype=np.float64), -1, -2).reshape(-1, 16))
-        view = self._blob(array.astype(array.dtype.newbyteorder("<")).tobytes())
+        view = self.blob(array.astype(array.dtype.newbyteorder("<")).tobytes())
         return self._accessor(array, False, view, 0)
 
     def packed(self, array: Array) -> int:
         """Add compressed 32-bit numbers, for `unpack` alone; return the buffer view."""
-        return self._blob(pack(array))
+        return self.blob(pack(array))
+
+    def blob(self, data: bytes) -> int:
+        """Add bytes, such as those of a document within the document; return their buffer view."""
+        view = self.add("bufferViews", {})
+        self._blobs.append((view, data))
+        return view
 
     def displacements(self, values: Floating) -> int:
         """Add a morph target, (V, 3), sparse where most vertices do not move; return the accessor."""
@@ -116,7 +122,7 @@ class Builder:
             kind = media_type(data)
             if kind is None:
                 raise ModelError(f"the picture {name!r} is neither PNG, JPEG nor WebP")
-            entry: dict[str, Any] = {"bufferView": self._blob(data), "mimeType": kind}
+            entry: dict[str, Any] = {"bufferView": self.blob(data), "mimeType": kind}
             self._pictures[data] = self.add("images", entry | ({"name": name} if name else {}))
         return self._pictures[data]
 
@@ -180,11 +186,6 @@ class Builder:
             raise ModelError(f"the file would be larger than {MAX_BYTES} bytes; simplify the model")
         content += array.astype(array.dtype.newbyteorder("<")).tobytes()
         return view, start
-
-    def _blob(self, data: bytes) -> int:
-        view = self.add("bufferViews", {})
-        self._blobs.append((view, data))
-        return view
 
     def _accessor(self, array: Array, bounds: bool, view: int, offset: int) -> int:
         return self.add("accessors", _located(_entry(array, bounds), view, offset))

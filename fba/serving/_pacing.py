@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
@@ -73,9 +74,14 @@ def show_pipe(stage: Stage, read: Callable[[int], bytes], splitter: PlaneSplitte
     stage.end(splitter.ending)
 
 
-def arriving(read: Callable[[int], bytes], splitter: PlaneSplitter, pace: Pace) -> Iterator[Plane]:
-    """Yield the planes of a stream that arrives, not faster than in real time; see `show_pipe`."""
-    return paced(_arriving(read, splitter), pace, lead=LEAD)
+def arriving(
+    read: Callable[[int], bytes], splitter: PlaneSplitter, pace: Pace, *, live: bool = False
+) -> Iterator[Plane]:
+    """Yield the planes of a stream that arrives, not faster than in real time; see `show_pipe`.
+
+    live: at once, also those that come all together after a delay: nothing that is late may stay late.
+    """
+    return paced(_arriving(read, splitter), pace, lead=math.inf if live else LEAD)
 
 
 def _arriving(read: Callable[[int], bytes], splitter: PlaneSplitter) -> Iterator[Plane]:

@@ -232,7 +232,7 @@ def test_a_disk_that_fills_up_while_a_shard_is_written(
         with open("/dev/full", "wb", buffering=0) as file:
             yield file
 
-    monkeypatch.setattr("fba.archive._shards.atomic", full)
+    monkeypatch.setattr("fba.archive._locations.atomic", full)
     with pytest.raises((FbaError, OSError), match="No space left"):
         write_shard(Path("nowhere"), 0, list(Archive(archive)))
 

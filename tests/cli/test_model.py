@@ -264,3 +264,58 @@ def test_tables_are_folded_to_the_width_of_a_terminal() -> None:
         "b.fba           3456",
     ]
     assert max(map(len, table_lines(("name", "text"), [("x", "words " * 40)], width=30))) <= 30
+
+
+def test_simplify_writes_a_smaller_face_and_tells_how_good_it_is(run: Run, tmp_path: Path) -> None:
+    small_head().save(tmp_path / "head.glb")
+    target = tmp_path / "small.glb"
+    code, out, err = run("model", "simplify", tmp_path / "head.glb", "-o", target, "--ratio", 0.3, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    small = FaceModel.load(target)
+    assert len(small.triangles) == told["levels"][0]["faces"] == round(0.3 * told["faces"])
+    assert 0 < told["levels"][0]["error_mm"] < 20
+    code, out, _ = run("model", "simplify", tmp_path / "head.glb", "-o", target, "--error", "2mm")
+    assert code == 0
+    assert f"{len(FaceModel.load(target).triangles)} triangles" in out
+    code, _, err = run(
+        "model", "simplify", tmp_path / "head.glb", "-o", target, "--faces", 100, "--no-clobber"
+    )
+    assert code == 1
+    assert "exists" in err
+
+
+def test_simplify_stores_levels_with_the_model(run: Run, tmp_path: Path) -> None:
+    head = small_head(cell=0.004)
+    head.save(tmp_path / "head.glb")
+    target = tmp_path / "levels.glb"
+    code, out, _ = run("model", "simplify", tmp_path / "head.glb", "-o", target, "--levels", 2)
+    assert code == 0
+    model = FaceModel.load(target)
+    assert len(model.triangles) == len(head.triangles)
+    sizes = [len(level.model.triangles) for level in model.levels]
+    assert len(sizes) == 2
+    assert sizes[0] > sizes[1]
+    assert all(f"{size} triangles" in out for size in sizes)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--default"], "how far to simplify is missing"),
+        (["--default", "--faces", 9, "--ratio", 0.5], "--faces and --ratio contradict each other"),
+        (["--faces", 900], "give either the HEAD to simplify"),
+        (["--default", "--ratio", 0], "0"),
+        (["--default", "--faces", 0], "0"),
+        (["--default", "--levels", 17], "17"),
+        (["--default", "--faces", 3], "3 triangles are too few"),
+    ],
+)
+def test_simplify_refuses_what_contradicts_itself(
+    run: Run, tmp_path: Path, arguments: list[object], message: str
+) -> None:
+    code, out, err = run("model", "simplify", *arguments, "-o", tmp_path / "out.glb")
+    assert code in (1, 2)
+    assert out == ""
+    assert message in " ".join(err.split())
+    assert not (tmp_path / "out.glb").exists()

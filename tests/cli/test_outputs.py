@@ -70,9 +70,9 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
                 writing.add(name)
                 assert "--no-clobber" in options, f"fba {name}"
     assert writing == {
-        "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model points",
-        "conformance", "capture", "markers", "express", "model learn-fit", "emote", "emotion",
-        "persona learn", "persona play", "export", "send",
+        "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model photos",
+        "model points", "conformance", "capture", "markers", "express", "model learn-fit", "model simplify",
+        "emote", "emotion", "persona learn", "persona play", "export", "send", "find",
     }  # fmt: skip
 
 
@@ -104,12 +104,16 @@ OVERWRITING = [
     "model learn-fit IN.fap -o OUT",
     "model learn-fit both.fba --model IN.glb -o OUT",
     "model learn-fit IN.fap -o new.glb --fit OUT",
+    "model simplify IN.glb -o OUT --faces 100",
     "emote IN.fap -o OUT --emotion angry",
     "emote face.fap -o OUT --keys IN.csv",
     "emote face.fap -o OUT --emotion angry --model IN.png",
     "markers IN.png -o OUT",
     "markers both.fba IN.glb -o OUT",
     "capture livelink --play --model IN.glb -o OUT",
+    "find IN.png both.fba -o OUT",
+    "find face.fap IN.png -o OUT",
+    "find --build OUT IN.npz",
     "send IN.fap rtp://127.0.0.1:50299 --sdp OUT",
 ]
 

@@ -44,10 +44,16 @@ def test_a_body_with_a_face(run: Run, opened: list[tuple[Any, dict[str, Any]]], 
     assert scene.view_for(scene.timeline.faps(0.0), scene.timeline.baps(0.0)).faces
 
 
+def test_without_anything_the_built_in_person(run: Run, opened: list[tuple[Any, dict[str, Any]]]) -> None:
+    assert run("play").code == 0
+    scene, options = opened[0]
+    assert scene.has_body
+    assert (options["panels"], options["title"]) == (("puppet",), "puppet")
+
+
 def test_options_that_need_a_file(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
     (tmp_path / "mine.glb").write_bytes(b"")
     for words, said in (
-        ((), "--model or --body"),
         (("--compare", "--model", tmp_path / "mine.glb"), "--compare needs two files"),
         (("--model", tmp_path / "mine.glb", "--audio", tmp_path / "mine.glb"), "--audio goes with a file"),
     ):

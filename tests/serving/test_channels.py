@@ -11,7 +11,7 @@ import pytest
 
 from fba.codec import encode_animation
 from fba.errors import BitstreamError
-from fba.serving import Plane, PlaneSplitter, show_file, show_pipe
+from fba.serving import Plane, PlaneSplitter, arriving, show_file, show_pipe
 from fba.serving._channel import MOST_KEPT, MOST_UNSENT, Channel
 from fba.serving._pacing import LEAD, LONGEST_PAUSE, paced
 from joinable_streams import JOINABLE, performance
@@ -155,6 +155,19 @@ def test_pacing() -> None:
     planes = [Plane(b"", at / 10, 10.0) for at in range(10)]
     shown = [round(stage.now - 50, 3) for _ in paced(planes, stage, lead=LEAD)]
     assert shown == [0, 0, 0, 0, 0, 0, 0.1, 0.2, 0.3, 0.4]
+
+
+def test_what_is_live_is_passed_on_at_once() -> None:
+    """Also what comes all together, after the program has started."""
+    data = encode_animation(performance(), JOINABLE)[0]
+    stage, rest = FakeStage(), iter([data, b""])
+    at_once = [
+        stage.now for _ in arriving(lambda _size: next(rest), PlaneSplitter("visage"), stage, live=True)
+    ]
+    stage, rest = FakeStage(), iter([data, b""])
+    paced = [stage.now for _ in arriving(lambda _size: next(rest), PlaneSplitter("visage"), stage)]
+    assert at_once == [50.0] * len(paced)
+    assert paced[-1] > 50.0
 
 
 def test_a_pipe_is_shown_as_it_comes() -> None:

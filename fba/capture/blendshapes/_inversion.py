@@ -96,9 +96,9 @@ def _angles(shown: Float64, names: tuple[str, ...]) -> Float64:
 def find_weights(products: Float64, goals: Float64, sweeps: int, settled: float) -> Float64:
     """Turn goals (T, N) into weights (T, N) of 0 to 1 that solve least squares; return them.
 
-    products: (N, N), of all shapes with each other. goals: products of what is wanted with each shape. Each
-    weight in turn is set to its best value for the others, up to `sweeps` times, until none changes by more
-    than `settled`. A frame starts from the weights of the frame before.
+    products: (N, N), of all shapes with each other, symmetric. goals: products of what is wanted with each
+    shape. Each weight in turn is set to its best value for the others, up to `sweeps` times, until none
+    changes by more than `settled`. A frame starts from the weights of the frame before.
 
     Bounds: indices run over the shape of goals, the array that is written; products is checked against it.
     """
@@ -106,20 +106,24 @@ def find_weights(products: Float64, goals: Float64, sweeps: int, settled: float)
     if products.shape[0] < shapes or products.shape[1] < shapes:
         raise IndexError("fewer products than shapes")
     for frame in range(frames):
-        row = goals[frame].copy()
+        rest = goals[frame].copy()  # what is wanted, less what the weights give
         weights = goals[frame]
         for shape in range(shapes):
             weights[shape] = goals[frame - 1, shape] if frame else 0.0
+            if weights[shape] != 0.0:
+                for other in range(shapes):
+                    rest[other] -= products[shape, other] * weights[shape]
         for _ in range(sweeps):
             change = 0.0
             for shape in range(shapes):
-                rest = row[shape]
-                for other in range(shapes):
-                    rest -= products[shape, other] * weights[other]
-                better = weights[shape] + rest / products[shape, shape]
+                better = weights[shape] + rest[shape] / products[shape, shape]
                 better = min(max(better, 0.0), 1.0)
-                change = max(change, abs(better - weights[shape]))
-                weights[shape] = better
+                moved = better - weights[shape]
+                if moved != 0.0:  # most weights rest at 0
+                    change = max(change, abs(moved))
+                    weights[shape] = better
+                    for other in range(shapes):
+                        rest[other] -= products[shape, other] * moved
             if change < settled:
                 break
     return goals

@@ -1,4 +1,4 @@
-"""`fba model`: inspect face models, check them, import them, fit them to a person."""
+"""`fba model`: inspect face models, check them, import, fit and simplify them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fba.cli.outputs import (
     output_option,
 )
 from fba.cli.printing import Progress, colour_grade, print_json
-from fba.cli.subcommands import model_learn_fit
+from fba.cli.subcommands import model_learn_fit, model_photos, model_simplify
 from fba.errors import FbaWarning
 
 if TYPE_CHECKING:
@@ -102,14 +102,18 @@ class _Mesh:
         "fba model points scan.obj -o scan.points.csv",
         "fba model import scan.obj --points scan.points.csv -o head.glb",
         "fba model fit person.fdp -o person.glb",
+        "fba model photos front.jpg side.jpg -o me.glb --edit me.points.json",
         "fba model learn-fit talk.fba -o ada.glb",
+        "fba model simplify head.glb -o small.glb --ratio 0.1",
     ),
 )
 def command() -> None:
-    """Inspect face models, check them, import them, fit them to a person."""
+    """Inspect face models, check them, import, fit and simplify them."""
 
 
 command.add_command(model_learn_fit.command)
+command.add_command(model_photos.command)
+command.add_command(model_simplify.command)
 
 
 def _read_or_default(file: Path | None, default: bool) -> FaceModel:

@@ -43,6 +43,7 @@ class _Window:
         "fba play original.fap decoded.fba --compare",
         "fba play rtp://0.0.0.0:5004",
         "nc host 7000 | fba play -",
+        "fba play",
         "fba play --model face.glb",
     ),
 )
@@ -72,8 +73,8 @@ def command(
 
     - is standard input: an FBA stream is shown while it arrives, as it is from a FIFO, and as one that is
     sent to an address of this computer, rtp://HOST:PORT, or to that of a description, FILE.sdp. Several
-    files are shown together. Without a file, --model or --body opens a neutral figure with sliders to move
-    it by hand. Without a display, use `fba render`.
+    files are shown together. Without a file, a neutral figure opens with sliders to move it by hand:
+    the built-in person, or that of --model or --body. Without a display, use `fba render`.
     """
     if len(files) < 2 and compare:
         single = f"; {files[0]} is one" if files else ""
@@ -84,8 +85,6 @@ def command(
         raise click.UsageError("standard input (-) can be shown once")
     if not files and sound.audio is not None:
         raise click.UsageError("--audio goes with a file to play")
-    if not files and how.model is None and how.body is None:
-        raise click.UsageError("give a file to play, or a --model or --body to move by hand")
     from fba import player
 
     player.check_display()  # before work that takes long
@@ -165,8 +164,9 @@ def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
     from fba import player
     from fba_player.session.performer import neutral
 
-    title = " ".join(file.name for file in (how.model, how.body) if file is not None)
-    scene = scenes.build_scene([neutral(body=how.body is not None)], [title], how)
+    title = " ".join(file.name for file in (how.model, how.body) if file is not None) or "puppet"
+    person = how.body is not None or how.model is None
+    scene = scenes.build_scene([neutral(body=person)], [title], how)
     return player.play(
         scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",)
     )

@@ -6,6 +6,8 @@ Every number is checked against the file's content before it is used. Errors nam
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fba.arrays import Float32, Float64, Int32
@@ -13,7 +15,7 @@ from fba.face._expressions import EXPRESSION_NAMES, VISEME_NAMES, Definitions
 from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.model import PART_KINDS, FaceModel, Part
+from fba.face.model import PART_KINDS, DetailLevel, FaceModel, Part
 from fba.gltf import (
     Budget,
     Document,
@@ -32,6 +34,7 @@ VERSION = 1
 MAX_PARTS = 1000
 MAX_NOTES = 1000
 MAX_BORDERS = 4096
+MAX_LEVELS = 16
 MAX_TRANSFORMS = 10_000
 INT32 = 2**31 - 1
 FLOAT32_MAX = float(np.finfo(np.float32).max)
@@ -54,6 +57,7 @@ def read_model(document: Document) -> FaceModel:
     for name, value in content.entries("morphValues", FAP_COUNT):  # only other programs use these
         _fap_number(name, value)
         value.number()
+    levels = content.get("levels")
     fit = None
     if (given := content.get("fit")) is not None:
         with locating_errors(given):
@@ -71,7 +75,28 @@ def read_model(document: Document) -> FaceModel:
             lost={_fap_number(key, value): value.text() for key, value in content.entries("lost", FAP_COUNT)},
             notes={key: value.text() for key, value in content.entries("notes", MAX_NOTES)},
             wrinkles=wrinkles is not None and wrinkles.boolean(),
+            levels=() if levels is None else _levels(document, levels, parts),
         )
+
+
+def _levels(document: Document, listed: Value, parts: tuple[Part, ...]) -> tuple[DetailLevel, ...]:
+    """Return the levels of detail, each a document in a buffer view; the pictures are those of the face."""
+    levels = []
+    pictures = {part.name: part.material.texture for part in parts}
+    count = sum(len(part.vertices) for part in parts)
+    for number, entry in enumerate(listed.elements(MAX_LEVELS)):
+        inner = document.embedded(entry.member("model"), f"level {number + 1}")
+        content = optional_member(inner.root.get("extensions"), NAME)
+        if content is not None and content.get("levels") is not None:
+            raise content.error("a level of detail has no levels itself")
+        model = read_model(inner)
+        shown = [
+            replace(part, material=replace(part.material, texture=pictures.get(part.name)))
+            for part in model.parts
+        ]
+        parents = unpack(document, entry.member("parents"), np.int32, (count,))
+        levels.append(DetailLevel(replace(model, parts=tuple(shown)), parents))
+    return tuple(levels)
 
 
 def _parts(listed: Value, gltf: Gltf, budget: Budget) -> tuple[Part, ...]:

@@ -6,6 +6,7 @@ The extension object makes meshes a face that FAPs move; `fba_face.schema.json` 
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from fba.face._tables import HEAD, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names
 from fba.face.gltf._reading import NAME, VERSION, read_model
 from fba.face.gltf.morphs import displacements, morph_values
-from fba.face.model import FaceModel
+from fba.face.model import DetailLevel, FaceModel
 from fba.gltf import MAX_TEXT, Builder, PartWriter, open_document
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import faps
@@ -46,8 +47,11 @@ def save(path: Path, model: FaceModel) -> None:
     build(model).save(path)
 
 
-def build(model: FaceModel) -> Builder:
-    """Return the glTF document of a model. Raises ModelError, with the reason, where glTF cannot hold it."""
+def build(model: FaceModel, *, morphs: bool = True) -> Builder:
+    """Return the glTF document of a model. Raises ModelError, with the reason, where glTF cannot hold it.
+
+    morphs: whether other programs get morph targets.
+    """
     builder = Builder()
     builder.root["extensionsUsed"] = [NAME]
     builder.root["scene"] = 0
@@ -56,7 +60,7 @@ def build(model: FaceModel) -> Builder:
     builder.add("nodes", {"name": HEAD, "children": nodes})
     writer = PartWriter(builder)
     primitives = [writer.primitive(part) for part in model.parts]
-    targets = _targets(builder, model)
+    targets = _targets(builder, model) if morphs else [{} for _ in model.parts]
     for part, primitive, moved in zip(model.parts, primitives, targets, strict=True):
         mesh: dict[str, Any] = {"name": part.name, "primitives": [primitive]}
         if moved:
@@ -97,7 +101,16 @@ def extension(builder: Builder, model: FaceModel, nodes: list[int]) -> dict[str,
         content["wrinkles"] = True
     if model.fit is not None:
         content["fit"] = model.fit.to_dict()
+    if model.levels:
+        content["levels"] = [_level(builder, level) for level in model.levels]
     return content
+
+
+def _level(builder: Builder, level: DetailLevel) -> dict[str, Any]:
+    """Return a level of detail: a face model in a buffer view, without the pictures, which it shares."""
+    plain = [replace(part, material=replace(part.material, texture=None)) for part in level.model.parts]
+    model = build(replace(level.model, parts=tuple(plain)), morphs=False)
+    return {"model": builder.blob(model.glb()), "parents": builder.packed(level.parents)}
 
 
 def _part(model: FaceModel, number: int, node: int) -> dict[str, Any]:

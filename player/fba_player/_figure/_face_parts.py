@@ -12,10 +12,10 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int32, Intp
 from fba.errors import FbaWarning
 from fba.face import FaceModel, Part
+from fba.mesh.simplify import DetailLevels
 from fba.parameters import point_rows
 from fba.rotations import unit
 from fba.sampling import smoothstep
-from fba_player._mesh.simplify import DetailLevels
 from fba_player._mesh.textures import RELIEF, FacePicture, load_picture, texture_breadth
 from fba_player.view._view import FaceShape
 

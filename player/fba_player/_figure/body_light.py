@@ -17,8 +17,8 @@ from fba.arrays import Array, Float32, Float64, Int32, Integer, Intp
 from fba.body import BodyModel
 from fba.cache import load_or_make, make_key
 from fba.compiled import compiled, is_compiled
+from fba.mesh.simplify import DetailLevels
 from fba_player._figure.face_light import KEY_DIRECTION, cached_visibility
-from fba_player._mesh.simplify import DetailLevels
 
 Prepared = tuple[Int32, Int32, Float32, Float32]
 

@@ -19,20 +19,47 @@ FADE_SECONDS = 0.4
 """Seconds in which a notice fades."""
 MAX_BUTTONS_SHARE = 0.55
 """Share of the window's width; wider buttons become one with a menu, so that they do not cover the figure."""
+SLOW = 0.9
+"""Speed below which a recording says that the window is slower than its film."""
+MAX_NAME_SHARE = 0.25
+"""Share of the window's width that the name and the facts may take together: a figure is in the middle."""
 MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
 
-def draw_recording(session: Session) -> float:
-    """Draw "REC" and the time in the upper left corner during a recording; return its width in points."""
+def draw_work(session: Session) -> float:
+    """Draw how far a recording and an export are in the upper left corner; return their width in points."""
+    taken = _draw_recording(session)
+    export = session.exports.now
+    if export is None:
+        return taken
+    x, y = EDGE + 4 + taken, EDGE + 7
+    to = imgui.get_background_draw_list()
+    text = f"Export {export.share:.0%}" if export.total else "Export begins"
+    to.add_rect_filled((x, y + 3), (x + 60, y + 15), theme.packed(theme.LINE), rounding=3.0)
+    to.add_rect_filled((x, y + 3), (x + 60 * export.share, y + 15), theme.packed(theme.ACCENT), rounding=3.0)
+    _draw_shadowed(to, (x + 70, y), theme.packed(theme.TEXT), text)
+    return taken + 90.0 + float(imgui.calc_text_size(text).x)
+
+
+def _draw_recording(session: Session) -> float:
     if session.recording is None:
         return 0.0
     to = imgui.get_background_draw_list()
     x, y = EDGE + 4, EDGE + 7
     text = f"REC {clock_text(session.recording)[:-2]}"
+    if session.recording_speed < SLOW:
+        text += f"   shown at {session.recording_speed:.0%} of the speed, all frames are in the film"
     to.add_circle_filled((x + 6, y + 9), 6.0, theme.packed(theme.ALERT))
     _draw_shadowed(to, (x + 20, y), theme.packed(theme.TEXT), text)
     return 40.0 + float(imgui.calc_text_size(text).x)
+
+
+def live_message(session: Session) -> str:
+    """Return what a live stream says of itself, such as that a part was lost, else ""."""
+    scene = session.scene
+    animation: object = scene.animation if isinstance(scene, Scene) else None
+    return animation.message if isinstance(animation, LiveAnimation) else ""
 
 
 def draw_name(session: Session, display: tuple[float, float], taken: float, room: float) -> None:
@@ -45,10 +72,10 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
     to = imgui.get_background_draw_list()
     x, y = EDGE + 4 + taken, EDGE + 7
     name = session.source.name or session.scene.title
-    scene = session.scene
-    animation: object = scene.animation if isinstance(scene, Scene) else None
-    facts = (animation.message if isinstance(animation, LiveAnimation) else "") or _facts(session)
-    if imgui.calc_text_size(name + facts).x + x > room:
+    message = live_message(session)
+    facts = message or _facts(session)
+    right = room if message else min(room, MAX_NAME_SHARE * display[0])
+    if imgui.calc_text_size(name + facts).x + x > right:
         facts = ""
     while name and imgui.calc_text_size(name).x + x > room:
         name = name[: max(len(name) - 8, 0)]

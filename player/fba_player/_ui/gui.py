@@ -8,7 +8,7 @@ from imgui_bundle import imgui, implot
 
 from fba_player._ui import theme
 from fba_player._ui._bar import Bar
-from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_recording
+from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_work, live_message
 from fba_player._ui._imgui_renderer import ImguiRenderer
 from fba_player._ui._panel_windows import PanelWindows
 from fba_player._ui.panels.registry import make_panels
@@ -17,7 +17,7 @@ from fba_player.session._pages import page_of
 from fba_player.session._session import Session
 
 HIDE_SECONDS = 3.0
-"""Seconds without input after which the bar is hidden while playing."""
+"""Seconds without input, and without news of a live stream, after which the bar is hidden while playing."""
 FADE_SECONDS = 0.25
 """Seconds in which the bar fades."""
 
@@ -51,6 +51,7 @@ class Gui:
         session.viewpoint.camera = session.viewpoint.beginning
         self._button = -1
         self._listed = False
+        self._message, self._told = "", 0.0  # what a live stream said last, and when
         self.shown = 1.0
         """Opacity of the bar, 0 to 1."""
 
@@ -125,7 +126,7 @@ class Gui:
         session = self.session
         self._hide(io)
         below = self._bar_height(display)
-        taken = draw_recording(session)
+        taken = draw_work(session)
         if self.shown > 0 and self._plays:
             imgui.push_style_var(imgui.StyleVar_.alpha, self.shown)
             self.bar.draw(session, display)
@@ -153,7 +154,11 @@ class Gui:
     def _hide(self, io: imgui.IO) -> None:
         session = self.session
         busy = imgui.is_any_item_active() or (io.want_capture_mouse and session.idle < 10 * HIDE_SECONDS)
-        away = self.hides and session.transport.playing and session.idle > HIDE_SECONDS and not busy
+        if (message := live_message(session)) != self._message:
+            self._message, self._told = message, session.clock()
+        told = session.clock() - self._told < HIDE_SECONDS or session.transport.waiting
+        quiet = session.idle > HIDE_SECONDS and not (message and told)
+        away = self.hides and session.transport.playing and quiet and not busy
         step = io.delta_time / FADE_SECONDS
         self.shown = max(self.shown - step, 0.0) if away else min(self.shown + 2 * step, 1.0)
 

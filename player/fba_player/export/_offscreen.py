@@ -15,7 +15,7 @@ from fba_player.gl._context import offscreen_context
 from fba_player.gl._framebuffer import Target
 from fba_player.gl._renderer import Renderer
 from fba_player.scene.scene import Scene
-from fba_player.view._camera import Camera
+from fba_player.view._camera import FACE_PRESETS, Camera
 from fba_player.view._view import View
 from fba_player.view.protocols import Closing, Showable
 
@@ -144,13 +144,15 @@ def cut_out(black: UInt8, white: UInt8) -> UInt8:
 
 def looks_at_head(camera: Camera | str | None) -> bool:
     """Return whether this is the name of a camera that looks at the face alone."""
-    return isinstance(camera, str) and camera != "body"
+    return camera in FACE_PRESETS
 
 
-def follow_camera(camera: Camera, scene: Scene, time: float, *, of_head: bool = False) -> Camera:
-    """Return the camera, moved along with a figure that walks away. of_head: follow its head instead."""
-    moved = scene.head_travel(time) if of_head else scene.travel(time)
-    if not any(moved):
-        return camera
-    x, y, z = (a + b for a, b in zip(camera.target, moved, strict=True))
-    return replace(camera, target=(x, y, z))
+def follow_camera(camera: Camera, scene: Showable, time: float, *, of_head: bool = False) -> Camera:
+    """Return the camera at a time, moved along with the figure and turned around it as the scene says.
+
+    of_head: whether it looks at the face alone.
+    """
+    moved = camera.move(scene.followed(time, of_head=of_head))
+    if scene.orbit is None:
+        return moved
+    return moved.orbit(360.0 * (time - float(scene.timeline.start)) / scene.orbit, 0.0)

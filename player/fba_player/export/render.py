@@ -67,8 +67,8 @@ def render(
     .png or .jpg: one picture. .mp4 or .gif: a film. frames/%05d.png, or a folder with a slash at its end:
     numbered pictures, from 0.
 
-    size: width and height in pixels; by default 1280x720, of a GIF 480x270. camera: a `Camera`, "front",
-    "three-quarter", "profile", "body", or None for the one that suits the content. For a picture: frame,
+    size: width and height in pixels; by default 1280x720, of a GIF 480x270. camera: a `Camera`, one of
+    `Camera.presets`, or None for the one that suits the content. For a picture: frame,
     its position in the animation (negative from the end), or time in seconds; by default the first frame.
     For a film: rate (by default the rate of the animation), and start and end in seconds. audio: a sound file
     for an MP4; it begins with the first frame of the animation, or audio_offset seconds later (earlier if

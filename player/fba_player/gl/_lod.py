@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32, Intp
 from fba.compiled import compiled
-from fba_player._mesh.simplify import TOLERANCES
+from fba.mesh.simplify import TOLERANCES
 from fba_player.view._view import FaceMesh, FaceShape
 
 MAX_ERROR_PIXELS = 1.3

@@ -246,16 +246,28 @@ class Transport:
     def interpolate(self, interpolate: bool) -> None:
         self._timeline.interpolate = bool(interpolate)
 
-    def use_clock(self, clock: Callable[[], float] = wall.monotonic, latency: float = 0.0) -> None:
-        """Follow another clock from now on, without a jump.
+    def use_clock(
+        self, clock: Callable[[], float] = wall.monotonic, latency: float = 0.0
+    ) -> tuple[Callable[[], float], float]:
+        """Follow another clock from now on, without a jump; return the former clock and latency.
 
         latency: seconds that playing and seeking wait before time goes on, so that the sound, which a device
         still has to be given, begins with the picture and is not cut.
         """
-        here = self.time
+        here, before = self.time, (self._clock, self._latency)
         self._clock = clock
         self._latency = latency
         self._motion = self._motion_from(clock(), here)
+        return before
+
+    @property
+    def until_next_frame(self) -> float:
+        """Seconds of the clock until another frame is shown, where each stays until the next."""
+        time = self.time
+        frame = self._timeline.position(time)[0]
+        last = frame + 1 >= self._timeline.frames
+        following = self.end if last else float(self._timeline.time_of(frame + 1))
+        return max(following - time, 0.0) / self._speed
 
     def text(self) -> str:
         """Return the time, frame and speed as text: "0:01.240 / 0:04.000 frame 31 / 99 1x"."""

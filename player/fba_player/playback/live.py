@@ -94,6 +94,7 @@ class LiveAnimation:
         self._closing = False
         self._failure: BaseException | None = None
         self._losses = 0
+        self._source_tells = False
         self._checked_bap_steps = bap_steps == BAP_STEPS_AUTO
         self._thread = threading.Thread(target=self._read, args=(head,), name="fba live", daemon=True)
         self._thread.start()
@@ -172,8 +173,12 @@ class LiveAnimation:
             return self._changed.wait_for(lambda: not self.growing, timeout)
 
     def tell(self, message: str) -> None:
-        """Show a message of the source, such as that a part of the stream was lost."""
+        """Show a message of the source, such as that a part of the stream was lost.
+
+        It knows more of that than the decoder, whose findings are `details` alone from then on.
+        """
         self.message = message
+        self._source_tells = True
 
     def close(self) -> None:
         """Stop reading; the thread ends with the next bytes."""
@@ -265,8 +270,9 @@ class LiveAnimation:
                 del damage[:-1]  # an endless stream may have any number
                 amount = f"{closed.stop - closed.start} bytes" if closed.stop > closed.start else "frames"
                 lost = f"{amount} lost at byte {closed.start}"
-                before = f" ({self._losses} losses before)" if self._losses else ""
-                self.message = lost + before
+                count = f"{self._losses} loss{'es' if self._losses > 1 else ''}"
+                before = f" ({count} before)" if self._losses else ""
+                self.message = self.message if self._source_tells else lost + before
                 self.details = f"{lost}{before}: {closed.error}"
             if self._buffer.left_out:
                 self.message = f"{self._buffer.left_out} came too late to be shown"

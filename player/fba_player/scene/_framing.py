@@ -52,15 +52,19 @@ HEADROOM = 0.14
 """Metres above the highest joint that a head takes."""
 
 
-def body_extent(positions: Float64, names: tuple[str, ...], headroom: float = HEADROOM) -> Extent:
+def body_extent(
+    positions: Float64, names: tuple[str, ...], headroom: float = HEADROOM, *, follow: str | None = None
+) -> Extent:
     """Return the extent of joints at positions (T, J, 3), metres, the root first, over T moments.
 
-    headroom: metres above the highest joint.
+    headroom: metres above the highest joint. follow: what the camera was told to follow, see `FOLLOWS`.
     """
     legs = positions[:, [names.index(name) for name in LEGS if name in names]]
     legs_move = bool(legs.size) and bool(np.abs(legs - legs[0]).max() > MAX_STANDING_TRAVEL)
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
-    if not np.isfinite(high - low).all() or (high - low).max() > MAX_FIXED_TRAVEL:
+    finite = bool(np.isfinite(high - low).all())
+    far = not finite or (high - low).max() > MAX_FIXED_TRAVEL
+    if (far and (follow != "none" or not finite)) or follow in ("hips", "head"):
         x, y, z = positions[0, 0].tolist()
         more = _head_above(positions, names, headroom) / 2
         subject = Subject((x, y - LOWER + more, z), BODY_SUBJECT.half_height + more, _reach(positions))

@@ -1,4 +1,4 @@
-"""The base of what is placed on a head by hand: the current item, next and previous, undoing, saving."""
+"""The base of what is placed by hand: the current item, next and previous, undoing, saving."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ State = TypeVar("State")
 
 
 class HandEditing(ABC, Generic[State]):
-    """Named items that a user places on a head one by one.
+    """Named items that a user places on a head or a picture one by one.
 
     state: all that is edited; a change replaces it. current: the name of the item that the next click places.
     path: the file to write; None if none was named. written: whether the file was written. item, subject:
@@ -44,12 +44,8 @@ class HandEditing(ABC, Generic[State]):
         """Names of the items that have a place."""
 
     @abstractmethod
-    def place(self, vertex: int) -> None:
-        """Put the current item on a vertex of the head."""
-
-    @abstractmethod
     def remove(self) -> None:
-        """Take the current item off the head."""
+        """Take the current item away."""
 
     @abstractmethod
     def _write(self, path: Path) -> None:

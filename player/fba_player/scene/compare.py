@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from fba_player.scene._compare_timeline import CompareTimeline
 from fba_player.scene._differences import Differences, differences
 from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
 from fba_player.scene.scene import Scene
-from fba_player.view._camera import PRESETS, Camera, Subject
+from fba_player.view._camera import FACE_PRESETS, PRESETS, Camera, Subject
 from fba_player.view._view import Extras, View
 from fba_player.view.protocols import Timed
 
@@ -36,6 +36,14 @@ SHOULDER_HALF_WIDTH = 0.25
 """Half the width (m) of a body that is seen from the hips up."""
 CAPTION_HEIGHT = 0.96
 """Height of a caption above the middle of a head, in half heads."""
+
+
+def _rebuild(
+    scenes: Sequence[Scene], arrangement: str, names: Sequence[str], orbit: float | None
+) -> CompareScene:
+    scene = CompareScene(scenes, arrangement=arrangement, names=names)
+    scene.orbit = orbit
+    return scene
 
 
 class CompareScene(Timed[CompareTimeline]):
@@ -63,6 +71,10 @@ class CompareScene(Timed[CompareTimeline]):
         self._drawings = [Drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
         self._apart: float | None = None
         self._differences: dict[tuple[int, int], Differences] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy in another process builds its figures anew."""
+        return _rebuild, (self.scenes, self.arrangement, self.names, self.orbit)
 
     @property
     def arrangement(self) -> str:
@@ -94,6 +106,16 @@ class CompareScene(Timed[CompareTimeline]):
     def title(self) -> str:
         """The scenes' names."""
         return " | ".join(name for name in self.names if name)
+
+    @property
+    def follow(self) -> str | None:
+        """What the camera follows; of all scenes."""
+        return self.scenes[0].follow
+
+    @follow.setter
+    def follow(self, what: str | None) -> None:
+        for scene in self.scenes:
+            scene.follow = what
 
     def show(self, name: str, on: object = True) -> None:
         """Set a switch of all scenes; ValueError for an unknown name or value."""
@@ -128,7 +150,8 @@ class CompareScene(Timed[CompareTimeline]):
         self._yaw = camera.yaw
         upper = [scene.gesture_subject or scene.face_subject for scene in self.scenes if scene.has_body]
         still = all(scene.gesture_subject for scene in self.scenes if scene.has_body)
-        if not self.has_body or preset == "body" or (preset is None and not still):
+        whole = preset is not None and preset not in FACE_PRESETS
+        if not self.has_body or whole or (preset is None and not still):
             subjects = [scene.subject for scene in self.scenes]
             self._apart = None
         elif preset is None:

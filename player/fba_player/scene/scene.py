@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from fba.arrays import Float32, Float64
 from fba.choices import Axes
 from fba_player.playback._timeline import Timeline
 from fba_player.scene._framing import Extent, body_extent
-from fba_player.view._camera import Camera, Subject
+from fba_player.view._camera import FACE_PRESETS, Camera, Subject
 from fba_player.view._view import View
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import SWITCHES, Switches
@@ -69,7 +69,8 @@ class Scene(Timed[Timeline]):
         self.timeline = timeline or Timeline(animation, self.model)
         self.switches = Switches()
         self.view = view
-        self._extent: Extent | None = None
+        self.axes = axes
+        self._extent: tuple[str | None, Extent] | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
             from fba.body import BodyModel, GroundedPoser
@@ -79,6 +80,13 @@ class Scene(Timed[Timeline]):
             self._skeleton = self._body.skeleton
             self._poser = GroundedPoser(self._skeleton, axes)
             self._bones = Bones.from_skeleton(self._skeleton)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy in another process builds its figures anew."""
+        body = replace(self._body) if self.has_body else None  # without what was made for drawing
+        state = {"follow": self.follow, "orbit": self.orbit}
+        switches = self.switches.changed
+        return _rebuild, (self.animation, self.model, body, self.axes, self.view, switches, state)
 
     @property
     def view(self) -> str:
@@ -157,12 +165,12 @@ class Scene(Timed[Timeline]):
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """Return a camera that has everything in view, for the named preset or for what the content suggests.
 
-        "body" fits the whole body; the other presets look at the face, from the front, at three quarters
-        or in profile, also where there is a body. ValueError for another name.
+        "body", "side", "back" and "top" fit the whole body; "front", "three-quarter", "profile" and "face"
+        look at the face, also where there is a body. ValueError for another name.
         """
         if preset is None:
             return default_camera(self, aspect)
-        subject = self.subject if self.has_body and preset == "body" else self.face_subject
+        subject = self.face_subject if preset in FACE_PRESETS or not self.has_body else self.subject
         return Camera.preset(preset, subject, aspect)
 
     def view_for(self, faps: Float32, baps: Float64) -> View:
@@ -241,13 +249,31 @@ class Scene(Timed[Timeline]):
 
     def _sampled_extent(self) -> Extent:
         frames = self.timeline.frames
-        if self._extent is None or frames >= 2 * self._sampled_frames:  # a stream has grown by much
+        grown = frames >= 2 * self._sampled_frames  # a stream, by much
+        if self._extent is None or self._extent[0] != self.follow or grown:
             self._sampled_frames = frames
             sampled = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in sampled])
             positions = self._poser.pose(baps)[:, :, :3, 3]
-            self._extent = body_extent(positions, self._skeleton.names, self.person.headroom)
-        return self._extent
+            extent = body_extent(positions, self._skeleton.names, self.person.headroom, follow=self.follow)
+            self._extent = (self.follow, extent)
+        return self._extent[1]
+
+
+def _rebuild(
+    animation: Animation,
+    model: FaceModel,
+    body: BodyModel | None,
+    axes: Axes,
+    view: str,
+    switches: dict[str, object],
+    state: dict[str, Any],
+) -> Scene:
+    scene = Scene(animation, model, body=body, axes=axes, view=view)
+    for name, value in switches.items():
+        scene.show(name, value)
+    vars(scene).update(state)
+    return scene
 
 
 def default_camera(scene: Scene, aspect: float = 16 / 9) -> Camera:

@@ -7,6 +7,8 @@ from functools import partial
 
 from fba_player.session._session import Session
 
+FOLLOW_TEXTS = {None: "by itself", "hips": "the hips", "head": "the head", "none": "nothing"}
+"""What the camera follows, as users read it."""
 SOUND_SHIFT = 0.02
 """Seconds by which one key press shifts the sound."""
 
@@ -41,8 +43,20 @@ def _interpolate(session: Session) -> None:
 
 
 def _follow(session: Session) -> None:
-    session.viewpoint.toggle_follow(session.transport.time)
-    session.say("the camera follows" if session.viewpoint.follow else "the camera stays", about="camera")
+    """Follow the next of what there is to follow."""
+    order = list(FOLLOW_TEXTS)
+    now = session.viewpoint.follow
+    _follow_that(session, order[(order.index(now) + 1) % len(order)])
+
+
+def _follow_that(session: Session, what: str | None) -> None:
+    session.viewpoint.follow = what
+    session.say(f"the camera follows: {FOLLOW_TEXTS[what]}", about="camera")
+
+
+def _orbit(session: Session) -> None:
+    session.viewpoint.toggle_orbit()
+    session.say("the camera turns" if session.scene.orbit else "the camera stays", about="camera")
 
 
 def _mute(session: Session) -> None:
@@ -87,6 +101,8 @@ _ACTIONS: dict[str, Callable[[Session], None]] = {
     "interpolate": _interpolate,
     "reset_view": lambda session: session.viewpoint.reset(),
     "follow": _follow,
+    "orbit": _orbit,
+    "copy_command": partial(Session.request, what="copy_command"),
     "points": Session.toggle_view,
     "mute": _mute,
     "sound_earlier": partial(_shift_sound, seconds=-SOUND_SHIFT),
@@ -102,4 +118,5 @@ _ACTIONS: dict[str, Callable[[Session], None]] = {
 _ACTIONS_WITH_NAME: dict[str, Callable[[Session, str], None]] = {
     "camera": lambda session, name: session.viewpoint.preset(name),
     "panel": Session.toggle_panel,
+    "follow": lambda session, name: _follow_that(session, None if name == "itself" else name),
 }

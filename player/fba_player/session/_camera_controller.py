@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import time as wall
 from collections.abc import Callable
-from dataclasses import replace
 
 from fba.sampling import smoothstep
-from fba_player.view._camera import Camera
+from fba_player.view._camera import FACE_PRESETS, Camera
 from fba_player.view.protocols import Showable
 
+ORBIT_SECONDS = 20.0
+"""Seconds in which the camera turns once around the subject, if nothing else is said."""
 GLIDE_SECONDS = 0.35
 """Seconds that a glide to another view takes."""
 NOT_SHIFTED = (0.0, 1.0)
@@ -41,13 +42,15 @@ class Viewpoint:
         self.scene = scene
         self.aspect = aspect
         self.covered = 0.0
-        self.follow = True
         self._first_view = camera
         self._clock = clock
         self._from = self._to = self.beginning
         self._until = -math.inf
         self._preset = camera if not isinstance(camera, Camera) else ""
-        self._fitted_to = (aspect, self._to)
+        self._of_head = self._preset in FACE_PRESETS
+        self._time = 0.0
+        self._turns_since = clock()
+        self._fitted_to = ((aspect, self.covered), self._to)
         self._sides = (0.0, 0.0)
         self._shift_before = self._shift = NOT_SHIFTED
         self._shift_until = -math.inf
@@ -65,7 +68,8 @@ class Viewpoint:
 
     @property
     def gliding(self) -> bool:
-        return self._clock() < max(self._until, self._shift_until)
+        """Whether it moves by itself."""
+        return self.scene.orbit is not None or self._clock() < max(self._until, self._shift_until)
 
     @property
     def beginning(self) -> Camera:
@@ -77,25 +81,30 @@ class Viewpoint:
         free = 1.0 - min(max(self.covered, 0.0), 0.5)
         camera = self.scene.camera(preset, self.aspect / free)
         camera = camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
-        self._fitted_to = (self.aspect, camera)
+        self._fitted_to = ((self.aspect, self.covered), camera)
         return camera
 
     def refit(self) -> None:
         """Fit the view to a picture of another shape, if it is a preset that was not moved since."""
-        aspect, camera = self._fitted_to
-        if self.aspect == aspect:
+        (aspect, covered), camera = self._fitted_to
+        if (aspect, covered) == (self.aspect, self.covered):
             return
         if self._preset != "" and self._to == camera:
-            self.camera = self.fit(self._preset)
+            if self.aspect == aspect:  # the bar has gone, or is back
+                self.glide(self.fit(self._preset))
+            else:
+                self.camera = self.fit(self._preset)
             self._shift = self._shift_between(*self._sides)
-        self._fitted_to = (self.aspect, self._fitted_to[1])
+        self._fitted_to = ((self.aspect, self.covered), self._fitted_to[1])
 
     def glide(self, camera: Camera) -> None:
         self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE_SECONDS
 
     def preset(self, name: str) -> None:
         """Glide to a preset. Raises ValueError for an unknown name."""
-        self.glide(self.fit(name))
+        to = self.fit(name)
+        self._stay(lambda: setattr(self, "_of_head", name in FACE_PRESETS))
+        self.glide(to)
         self._preset = name
 
     def uncover(self, left: float, right: float, *, smoothly: bool = True) -> None:
@@ -108,13 +117,15 @@ class Viewpoint:
         self._shift_until = self._clock() + GLIDE_SECONDS if smoothly else -math.inf
 
     def reset(self) -> None:
-        self.follow = True
-        self.glide(self.beginning)
+        """Glide to the first view."""
         self._preset = self._first_view if not isinstance(self._first_view, Camera) else ""
+        self._stay(lambda: setattr(self, "_of_head", self._preset in FACE_PRESETS))
+        self.glide(self.beginning)
 
     def camera_without_panels(self, time: float) -> Camera:
         """Return the camera at a time in seconds, for a picture without panels at the sides."""
-        return self._follow_travel(self.camera, time, 1.0) if self.follow else self.camera
+        self._time = time
+        return self.camera.move(self._followed()).orbit(self._turned(), 0.0)
 
     def camera_at(self, time: float) -> Camera:
         """Return the camera at a time in seconds, with the figure between the panels at the sides."""
@@ -125,10 +136,58 @@ class Viewpoint:
         up = -min(max(self.covered, 0.0), 0.5) / 2 * (1 - 1 / further)
         return self.camera_without_panels(time).zoom(further).pan(-shift * self.aspect, up)
 
-    def toggle_follow(self, time: float) -> None:
-        """Turn following a figure that walks away on or off; the picture at `time` does not jump."""
-        self.camera = self._follow_travel(self.camera, time, 1.0 if self.follow else -1.0)
-        self.follow = not self.follow
+    @property
+    def follow(self) -> str | None:
+        """What it follows, see `Timed.follow`; setting it does not let the picture jump."""
+        return self.scene.follow
+
+    @follow.setter
+    def follow(self, what: str | None) -> None:
+        self._stay(lambda: setattr(self.scene, "follow", what))
+        if self._preset != "":
+            self.glide(self.fit(self._preset))
+
+    def toggle_orbit(self) -> None:
+        """Let the camera turn slowly around the subject, from where it is, or stay where it is."""
+        turned = self._turned()
+        self._turns_since = self._clock()
+        self._from, self._to = self._from.orbit(turned, 0.0), self._to.orbit(turned, 0.0)
+        self.scene.orbit = ORBIT_SECONDS if self.scene.orbit is None else None
+
+    @property
+    def following(self) -> str | None:
+        """What a camera without the name of its view has to follow to do as this one does."""
+        return "head" if self.follow is None and self._of_head else self.follow
+
+    def options(self) -> dict[str, str]:
+        """Return the options of `fba play` and `fba render` that give this view, by their names."""
+        orbit = f"{self.scene.orbit:g}" if self.scene.orbit else ""
+        given = {
+            "camera": self.camera.orbit(self._turned(), 0.0).text,
+            "follow": self.following or "",
+            "orbit": orbit,
+        }
+        return {name: value for name, value in given.items() if value}
+
+    def camera_for_export(self, aspect: float) -> Camera:
+        """Return the camera for pictures of another shape: a view that was not moved is fitted."""
+        if self._preset != "" and self._to == self._fitted_to[1]:
+            return self.scene.camera(self._preset, aspect)
+        return self.camera.orbit(self._turned(), 0.0)
+
+    def _turned(self) -> float:
+        """Return the degrees that it has turned by itself."""
+        orbit = self.scene.orbit
+        return 0.0 if orbit is None else 360.0 * (self._clock() - self._turns_since) / orbit
+
+    def _followed(self) -> tuple[float, float, float]:
+        return self.scene.followed(self._time, of_head=self._of_head)
+
+    def _stay(self, change: Callable[[], None]) -> None:
+        """Change what is followed, and let the camera be where it was."""
+        before, camera = self._followed(), self.camera
+        change()
+        self.camera = camera.move(before).move(self._followed(), -1.0)
 
     def _progress(self, until: float) -> float:
         """Return the progress, 0 to 1, of a glide that ends at a reading of the clock, slow at both ends."""
@@ -152,10 +211,3 @@ class Viewpoint:
         # Last: a scene arranges its figures for the camera asked for last.
         full = self.scene.camera(self._preset, aspect).distance
         return (left - right) / 2, max(narrow / full, 1.0)
-
-    def _follow_travel(self, camera: Camera, time: float, direction: float) -> Camera:
-        travel = self.scene.travel(time)
-        if not any(travel):
-            return camera
-        x, y, z = (a + direction * b for a, b in zip(camera.target, travel, strict=True))
-        return replace(camera, target=(x, y, z))

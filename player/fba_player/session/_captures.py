@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -23,8 +24,41 @@ from fba_player.sound.soundtrack import FilmSound
 
 FILM_RATE = 30
 """Frames per second of a film of the window."""
+SPEED_FRAMES = 30
+"""Frames of a film over which its speed is measured."""
 SAMPLES = 4
 """Samples per pixel of a screenshot, which need not be fast."""
+
+
+class FilmClock:
+    """The clock of a window while it records a film: it goes on by one frame with each picture.
+
+    So the film has all of its frames, however long a picture takes to be drawn and encoded; on a slow machine
+    what the window shows goes more slowly meanwhile.
+
+    clock: that of the window before, which this one continues and never overtakes.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self.before = clock
+        self.frames = 0
+        self._begun = clock()
+        self._drawn: deque[float] = deque(maxlen=SPEED_FRAMES)
+
+    def __call__(self) -> float:
+        return self._begun + self.seconds
+
+    @property
+    def seconds(self) -> float:
+        """Length of the film so far."""
+        return self.frames / FILM_RATE
+
+    def go_on(self) -> float:
+        """Go to the next frame of the film; return by how many seconds it has gone on per second of late."""
+        self.frames += 1
+        self._drawn.append(self.before())
+        taken = self._drawn[-1] - self._drawn[0]
+        return (len(self._drawn) - 1) / FILM_RATE / taken if taken > 0 else 1.0
 
 
 class Captures:
@@ -39,8 +73,9 @@ class Captures:
         self.folder = Path(folder) if folder is not None else Path()
         self._recorder: Recorder | None = None
         self._sound: FilmSound | None = None
-        self._begun = 0.0
-        self._read: tuple[float, Callable[[], UInt8]] | None = None
+        self._clock: FilmClock | None = None
+        self._clock_of_transport: tuple[Callable[[], float], float] = (session.clock, 0.0)
+        self._read: Callable[[], UInt8] | None = None
 
     @property
     def recording(self) -> bool:
@@ -71,28 +106,25 @@ class Captures:
             self.session.say(f"No film can be recorded: {error}", "error", 8.0)
             return
         self._sound = sound
-        self._begun = self.session.clock()
-        self.session.recording = 0.0
+        self._follow_film()
 
     def begin_picture(self) -> None:
         """Add the last picture to the film, mix its sound up to now; call before each picture is drawn."""
         self._add_read()
-        if self._recorder is None:
-            return
-        self.session.recording = self.session.clock() - self._begun
-        if self._sound is not None:
-            self._sound.advance(self.session.recording)
+        if self._sound is not None and self._clock is not None:
+            self._sound.advance(self._clock.seconds)
 
     def add_picture(self, start: Callable[[], Callable[[], UInt8]]) -> None:
-        """Add the picture drawn since `begin_picture` to the film.
+        """Add the picture drawn since `begin_picture` to the film, whose clock goes on to the next.
 
         start: begins to read it, and returns a function that gives its pixels, uint8 (H, W, 4), which is
-        called when the next picture begins, so that nothing waits. start is not called if the film needs no
-        frame.
+        called when the next picture begins, so that the graphics card is not waited for. start is not called
+        if no film is recorded.
         """
-        seconds = self.session.recording
-        if self._recorder is not None and seconds is not None and self._recorder.wants(seconds):
-            self._read = seconds, start()
+        if self._clock is not None:
+            self._read = start()
+            self.session.recording_speed = self._clock.go_on()
+            self.session.recording = self._clock.seconds
 
     def close(self) -> Path | None:
         """Finish the film; return its path, None if none is being recorded. Raises FbaError, OSError."""
@@ -100,10 +132,10 @@ class Captures:
         if self._recorder is None:
             return None
         recorder, sound = self._recorder, self._sound
-        self._recorder = self._sound = self.session.recording = None
         if sound is not None:
-            sound.advance(self.session.clock() - self._begun)
+            sound.advance(float(recorder.seconds))
             sound.end()
+        self._stop()
         return recorder.close()
 
     def _add_read(self) -> None:
@@ -111,12 +143,33 @@ class Captures:
         read, self._read = self._read, None
         if self._recorder is None or read is None:
             return
-        seconds, fetch = read
         try:
-            self._recorder.add(fetch(), seconds, wait=False)
+            self._recorder.add(read())
         except (OSError, FbaError) as error:
-            self._recorder = self._sound = self.session.recording = None
+            self._stop()
             self.session.say(f"Recording stopped: {error}", "error", 8.0)
+
+    def _follow_film(self) -> None:
+        """Let all that moves follow the clock of the film; the sound is in it, and not heard meanwhile."""
+        session = self.session
+        self._clock = session.clock = FilmClock(session.clock)
+        self._clock_of_transport = session.transport.use_clock(self._clock)
+        session.recording, session.recording_speed = 0.0, 1.0
+        if session.audio is not None:
+            session.audio.held = True
+            session.say("The film has the sound; it is not heard while the film is recorded", about="film")
+
+    def _stop(self) -> None:
+        """Forget the film, and follow the clocks of before."""
+        session = self.session
+        self._recorder = self._sound = session.recording = None
+        if self._clock is None:
+            return
+        session.clock = self._clock.before
+        session.transport.use_clock(*self._clock_of_transport)
+        self._clock = None
+        if session.audio is not None:
+            session.audio.held = False
 
     def _open_sound(self) -> FilmSound | None:
         """Return the sound for a new film; None without sound, or, with a notice, if it cannot be used."""

@@ -34,6 +34,7 @@ class Controls:
         self._held: str | None = None
         self._last = (0.0, 0.0)
         self._dragged = False
+        self._may_click = False
 
     def key(self, name: str, *, held: bool = False) -> bool:
         """Handle a key that was pressed, or is still held. name: as in the table of keys, in lower case.
@@ -61,7 +62,18 @@ class Controls:
             self._held = "timeline"
             self._seek(x)
         elif button in ("left", "right", "middle"):
-            self._held = "orbit" if button == "left" else "pan"
+            page = page_of(self.session)
+            flat = page is not None and page.grab is not None
+            if (
+                button == "left"
+                and page is not None
+                and page.grab is not None
+                and page.grab(self.session, x, y)
+            ):
+                self._held = "item"
+            else:
+                self._held = "orbit" if button == "left" and not flat else "pan"
+            self._may_click = button == "left"
 
     def move(self, x: float, y: float) -> None:
         right, down = x - self._last[0], y - self._last[1]
@@ -71,8 +83,11 @@ class Controls:
                 return
         self._last = (x, y)
         viewpoint = self.session.viewpoint
+        page = page_of(self.session)
         if self._held == "timeline":
             self._seek(x)
+        elif self._held == "item" and page is not None and page.drag is not None:
+            page.drag(self.session, x, y)
         elif self._held == "orbit" and (right or down):
             turn = ORBIT_SPEED / self.session.scale
             viewpoint.camera = viewpoint.camera.orbit(-right * turn, down * turn)
@@ -82,9 +97,11 @@ class Controls:
 
     def release(self) -> None:
         """Handle the mouse button going up: one that did not move is a click, on pages that have them."""
-        clicked = self._held == "orbit" and not self._dragged
-        self._held = None
+        clicked = self._held in ("orbit", "pan") and self._may_click and not self._dragged
         page = page_of(self.session)
+        if self._held == "item" and page is not None and page.drop is not None:
+            page.drop(self.session)
+        self._held = None
         if clicked and page is not None:
             page.click(self.session, *self._last)
 

@@ -1,4 +1,4 @@
-"""Windows for one task on a head, in which clicks and keys have meanings of their own."""
+"""Windows for one task on a head or photographs, in which clicks and keys have meanings of their own."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from fba.errors import FbaError
 from fba_player.scene._hand_editing import HandEditing
+from fba_player.scene._photo_editing import PhotoEditing
+from fba_player.scene._photo_scene import PhotoScene
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.scene.marker_editing import MarkerEditing
@@ -29,13 +31,17 @@ COMMON_KEYS = {
 
 @dataclass(frozen=True, eq=False)
 class Page(Generic[Edited]):
-    """A window in which items are placed on a head by hand.
+    """A window in which items are placed on a head or on photographs by hand.
 
     panel: name of the panel that belongs to it. topic: what its notices are about. plays: whether the
     timeline and the buttons of panels are shown. find: returns what a session's window edits, None for other
     windows. click: does what a click at a pixel means. keeps: whether an action of the table of keys keeps
     its key. all_placed: the notice where no item is missing. tell_saved: tells that the file was written.
     actions, keys: the actions of this page and their keys, besides those that all pages have.
+
+    Pages whose items are dragged show a flat picture, which does not turn, and have three functions more.
+    grab: takes hold of what is at a pixel, and returns whether there was anything. drag: moves it to a pixel.
+    drop: lets go of it.
     """
 
     panel: str
@@ -48,6 +54,9 @@ class Page(Generic[Edited]):
     tell_saved: Callable[[Session, Edited], None]
     actions: Mapping[str, Callable[[Session, Edited], None]]
     keys: Mapping[str, str]
+    grab: Callable[[Session, float, float], bool] | None = None
+    drag: Callable[[Session, float, float], None] | None = None
+    drop: Callable[[Session], None] | None = None
 
     def press_key(self, session: Session, name: str) -> bool:
         """Do what a key means here; return False if it has no meaning. name: as in the table of keys."""
@@ -233,7 +242,81 @@ MARKING: Page[MarkerEditing] = Page(
 )
 
 
-PAGES: tuple[Page[Any], ...] = (PLACING, MARKING)
+# --- Photographs --------------------------------------------------------------------------------------
+
+PHOTO_KEYS = (
+    ("Drag", "a point: move it; elsewhere: move the picture"),
+    ("Wheel", "nearer, further"),
+    ("Click", "place the current point here"),
+    ("Down, Up", "next point, previous point"),
+    ("Space, Enter", "next point without a place"),
+    ("Ctrl+Z", "undo"),
+    ("Delete", "remove the point"),
+    ("Ctrl+S", "save"),
+    ("R", "all of the pictures"),
+    ("Esc", "close"),
+)
+"""Keys of the page for photographs, for its panel."""
+
+
+def _photo_scene(session: Session) -> PhotoScene:
+    assert isinstance(session.scene, PhotoScene)
+    return session.scene
+
+
+def _spot(session: Session, x: float, y: float) -> tuple[float, float]:
+    """Return what a pixel shows of the current point's photograph."""
+    scene = _photo_scene(session)
+    return scene.spot_under(session.camera(0.0), x, y, session.size, scene.editing.current)
+
+
+def _click_on_photo(session: Session, x: float, y: float) -> None:
+    editing = _photo_scene(session).editing
+    editing.move(_spot(session, x, y))
+    PHOTOS.note_unsaved(session, editing)
+
+
+def _grab_point(session: Session, x: float, y: float) -> bool:
+    scene = _photo_scene(session)
+    item = scene.item_under(session.camera(0.0), x, y, session.size)
+    if item is not None:
+        scene.editing.choose(item)
+    return item is not None
+
+
+def _drag_point(session: Session, x: float, y: float) -> None:
+    editing = _photo_scene(session).editing
+    editing.move(_spot(session, x, y), "drag")
+    PHOTOS.note_unsaved(session, editing)
+
+
+def _drop_point(session: Session) -> None:
+    _photo_scene(session).editing.end_gesture()
+
+
+def _tell_photos_saved(session: Session, editing: PhotoEditing) -> None:
+    text = f"{len(editing.state)} points saved as {editing.path}; close the window to make the head"
+    session.say(text, "done", NOTICE_SECONDS, about="photos")
+
+
+PHOTOS: Page[PhotoEditing] = Page(
+    panel="photos",
+    topic="photos",
+    plays=False,
+    find=lambda session: session.scene.editing if isinstance(session.scene, PhotoScene) else None,
+    click=_click_on_photo,
+    keeps=PLACING.keeps,
+    all_placed="All points have a place: Ctrl+S saves them",
+    tell_saved=_tell_photos_saved,
+    actions={},
+    keys={"right": "next", "left": "previous", "space": "missing"},
+    grab=_grab_point,
+    drag=_drag_point,
+    drop=_drop_point,
+)
+
+
+PAGES: tuple[Page[Any], ...] = (PLACING, MARKING, PHOTOS)
 
 
 def page_of(session: Session) -> Page[Any] | None:

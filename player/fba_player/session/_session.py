@@ -21,6 +21,7 @@ from fba.atomic import PathLike
 from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._camera_controller import Viewpoint
+from fba_player.session._exports import Exports
 from fba_player.session._keys import by_name
 from fba_player.session._source import Source
 from fba_player.view._camera import Camera
@@ -75,19 +76,21 @@ class Selection:
 class Session:
     """The state that the window and its panels share.
 
-    scene, transport, viewpoint: what is shown, its current time, and the camera. source: the file behind it.
-    selection: FAPs and BAPs. open: names of the open panels. bare: whether everything but the picture is
-    hidden. size: of the picture in pixels. scale: pixels per point of the display.
+    scene, transport, viewpoint: what is shown, its current time, and the camera. exports: see `Exports`.
+    source: the file behind it. selection: FAPs and BAPs. open: names of the open panels. bare: whether
+    everything but the picture is hidden. size: of the picture in pixels. scale: pixels per point of the
+    display.
 
     before_frame: functions called as hook(faps, baps) before each picture; they may change the values that
     will be shown in place: FAPs, float32 (68,), and BAPs, float64 (296,), zeros without a body.
 
     requests: what the window shall do after this picture, see `request`. recording: seconds of the film so
-    far, None if none is being recorded. values: FAPs and BAPs of the last picture, after the hooks. sound:
-    path of the sound file; audio: its player, None without a sound device; the sound begins sound_offset
-    seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures without input.
-    unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next, see `drop`.
-    popup: whether a list is open over the picture; set to False to close it.
+    far, None if none is being recorded. recording_speed: seconds of it per second, below 1 on a machine
+    that draws more slowly than the film is shown. values: FAPs and BAPs of the last picture, after the
+    hooks. sound: path of the sound file; audio: its player, None without a sound device; the sound begins
+    sound_offset seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures
+    without input. unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next,
+    see `drop`. popup: whether a list is open over the picture; set to False to close it.
     """
 
     def __init__(
@@ -106,7 +109,8 @@ class Session:
         self.source = source or Source(scene)
         self.size = size
         self.scale = scale
-        self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=clock)
+        self.clock = clock
+        self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=self._now)
         self.selection = Selection()
         self.open: set[str] = set()
         self.bare = False
@@ -114,8 +118,10 @@ class Session:
         self.before_frame: list[Hook] = []
         self.requests: deque[str] = deque()
         self.recording: float | None = None
+        self.recording_speed = 1.0
         self.rolling: set[str] = set()
         self.unsaved: set[str] = set()
+        self.exports = Exports(scene, self.say, self.rolling, self.unsaved)
         self.dropped: tuple[Path, ...] = ()
         self.full_screen = False
         self.popup = False
@@ -123,7 +129,6 @@ class Session:
         self.sound: PathLike | None = None
         self.sound_offset = 0.0
         self.values: tuple[Float32, Float64] = (np.zeros(68, np.float32), np.zeros(296))
-        self.clock = clock
         self.last_input = clock()
         self._notices: list[Notice] = []
         self._leave_again_until = -math.inf
@@ -152,13 +157,17 @@ class Session:
         return list(self._notices)
 
     def request(self, what: str) -> None:
-        """Request "screenshot", "transparent", "record" or "fullscreen" from the window."""
+        """Request "screenshot", "transparent", "record", "fullscreen" or "copy_command" from the window."""
         self.requests.append(what)
 
     def escape(self) -> None:
-        """Close an open list, else leave full screen, else close the window."""
+        """Close what is in the way, one thing a time: a list, the help, a film, full screen, the window."""
         if self.popup:
             self.popup = False
+        elif "help" in self.open and not self.bare:
+            self.open.discard("help")
+        elif self.recording is not None:
+            self.request("record")
         elif self.full_screen:
             self.request("fullscreen")
         else:
@@ -190,6 +199,10 @@ class Session:
         if self.closing:
             self.dropped = paths
 
+    def _now(self) -> float:
+        """Return the reading of the clock, which is another while a film is recorded."""
+        return self.clock()
+
     def touched(self) -> None:
         """Note that the user moved the mouse or pressed something, so that hidden controls come back."""
         self.last_input = self.clock()
@@ -205,11 +218,10 @@ class Session:
 
     @property
     def restless(self) -> bool:
-        """Whether the picture changes without input of the user."""
+        """Whether the picture changes without input of the user, for another reason than that it plays."""
         fades_from = self.clock() + NOTICE_FADE_SECONDS
         return (
-            self.transport.playing
-            or self.viewpoint.gliding
+            self.viewpoint.gliding
             or bool(self.rolling)
             or self.recording is not None
             or any(notice.until < fades_from for notice in self._notices)

@@ -66,6 +66,7 @@ class Audio(Closing):
         self.rate = file.rate
         self.clock = SoundClock(file.rate, (PERIODS - 1) * PERIOD)
         self._offset = offset
+        self._muted = self._held = False
         self._blocks = SoundBlocks(file, self._samples_ahead)
         self._mixer = SoundMixer(self._blocks.take, file.rate, lambda: transport.motion, self._origin)
         self._device: Any = None
@@ -106,11 +107,22 @@ class Audio(Closing):
     @property
     def muted(self) -> bool:
         """Whether it is silent, whatever the volume."""
-        return self._mixer.muted
+        return self._muted
 
     @muted.setter
     def muted(self, muted: bool) -> None:
-        self._mixer.muted = bool(muted)
+        self._muted = bool(muted)
+        self._mixer.muted = self._muted or self._held
+
+    @property
+    def held(self) -> bool:
+        """Whether it is silent for as long as the transport follows another clock than the device's."""
+        return self._held
+
+    @held.setter
+    def held(self, held: bool) -> None:
+        self._held = bool(held)
+        self._mixer.muted = self._muted or self._held
 
     def close(self) -> None:
         """Stop the sound; the transport goes on with the wall clock. Safe to call twice."""

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fba.arrays import Float64
 
-PRESETS = {"front": (0.0, 0.0), "three-quarter": (35.0, 5.0), "profile": (90.0, 0.0), "body": (25.0, 8.0)}
-"""Yaw (to the subject's left) and pitch (from above) of the named views, degrees."""
 PITCH_LIMIT = 89.0
 DISTANCES = (0.05, 100.0)
+PRESETS = {
+    "front": (0.0, 0.0), "three-quarter": (35.0, 5.0), "profile": (90.0, 0.0), "face": (0.0, 0.0),
+    "body": (25.0, 8.0), "side": (90.0, 0.0), "back": (180.0, 0.0), "top": (0.0, PITCH_LIMIT),
+}  # fmt: skip
+"""Yaw (to the subject's left) and pitch (from above) of the named views, degrees."""
+FACE_PRESETS = ("front", "three-quarter", "profile", "face")
+"""Views of the face, also where there is a body; the others show the whole figure."""
+CLOSE = (0.74, 0.1)
+"""Of the view "face": its height, and how far its middle lies higher, in those of the other views."""
+FOLLOWS = ("hips", "head", "none")
+"""What a camera may be told to follow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +52,75 @@ class Camera:
     pitch: float = 0.0
     distance: float = 1.0
     field_of_view: float = 24.0
+    presets: ClassVar[tuple[str, ...]] = tuple(PRESETS)
+    """Names of the views."""
 
     @classmethod
     def preset(cls, name: str, subject: Subject, aspect: float = 16 / 9) -> Camera:
-        """Return a named view ("front", "three-quarter", "profile", "body") that fits the subject.
+        """Return a named view, see `PRESETS`, that fits the subject.
 
         aspect: width / height of the picture. Raises ValueError on another name.
         """
         if name not in PRESETS:
             raise ValueError(f"no camera preset {name!r}; there are {', '.join(PRESETS)}")
         yaw, pitch = PRESETS[name]
+        if name == "face":
+            x, y, z = subject.centre
+            centre = (x, y + CLOSE[1] * subject.half_height, z)
+            subject = Subject(centre, CLOSE[0] * subject.half_height, CLOSE[0] * subject.half_width)
+        elif name == "top":
+            wide, high = subject.half_width, subject.half_height
+            subject = replace(subject, half_height=wide, half_depth=high)
         return cls(yaw=yaw, pitch=pitch).fit(subject, aspect)
+
+    @classmethod
+    def parse(cls, text: str) -> Camera:
+        """Return the camera of a text as `text` gives it; ValueError for another."""
+        fields = {"turn": "yaw", "tilt": "pitch", "distance": "distance", "angle": "field_of_view"}
+        values: dict[str, Any] = {}
+        for part in text.split(","):
+            name, _, value = part.partition("=")
+            try:
+                numbers = tuple(float(number) for number in value.split(":"))
+                if name == "at" and len(numbers) == 3:
+                    values["target"] = numbers
+                elif len(numbers) == 1:
+                    values[fields[name]] = numbers[0]
+                else:
+                    raise KeyError
+                if not all(map(math.isfinite, numbers)):
+                    raise ValueError
+            except (KeyError, ValueError):
+                what = f"{part!r} of {text!r} has no meaning" if "=" in text else f"no view {text!r}"
+                raise ValueError(
+                    f"{what}: there are {', '.join(PRESETS)}; or give any of turn=DEGREES, tilt=DEGREES, "
+                    "distance=METRES, at=X:Y:Z and angle=DEGREES, with commas between them"
+                ) from None
+        camera = cls(**values)
+        for name, number, (low, high) in (
+            ("tilt", camera.pitch, (-PITCH_LIMIT, PITCH_LIMIT)),
+            ("distance", camera.distance, DISTANCES),
+            ("angle", camera.field_of_view, (1.0, 120.0)),
+        ):
+            if not low <= number <= high:
+                raise ValueError(f"{name}={number:g} of the camera lies outside of {low:g} to {high:g}")
+        return camera
+
+    @property
+    def text(self) -> str:
+        """The camera as text: "turn=35,tilt=5,distance=1.2,at=0:1.6:0,angle=24"."""
+        x, y, z = (f"{value:.4g}" for value in self.target)
+        return (
+            f"turn={self.yaw:.4g},tilt={self.pitch:.4g},distance={self.distance:.4g},at={x}:{y}:{z},"
+            f"angle={self.field_of_view:.4g}"
+        )
+
+    def move(self, offset: tuple[float, float, float], sign: float = 1.0) -> Camera:
+        """Return the camera with its target moved by an offset (x, y, z), metres, times `sign`."""
+        if not any(offset):
+            return self
+        x, y, z = (a + sign * b for a, b in zip(self.target, offset, strict=True))
+        return replace(self, target=(x, y, z))
 
     def fit(self, subject: Subject, aspect: float) -> Camera:
         """Return the camera, moved along its direction so that the subject fills the picture."""

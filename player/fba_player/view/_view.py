@@ -18,7 +18,7 @@ from fba.mesh import Alpha
 from fba_player._mesh.textures import linear_light
 
 if TYPE_CHECKING:
-    from fba_player._mesh.simplify import DetailLevels
+    from fba.mesh.simplify import DetailLevels
     from fba_player._mesh.textures import FacePicture
 
 

@@ -62,6 +62,11 @@ class Timed(Generic[Own]):
 
     timeline: Own
     switches: Switches
+    follow: str | None = None
+    """What the camera follows, one of `FOLLOWS`; None: the head in views of the face, else a figure that
+    walks away."""
+    orbit: float | None = None
+    """Seconds in which the camera turns once around the subject; None if it does not."""
 
     @property
     def rate(self) -> Fraction:
@@ -91,6 +96,14 @@ class Timed(Generic[Own]):
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
         """Return the displacement of the head from the start to a time, metres; by default that of all."""
+        return self.travel(time)
+
+    def followed(self, time: float, *, of_head: bool = False) -> tuple[float, float, float]:
+        """Return the offset (x, y, z) of a camera at a time, metres. of_head: if it looks at the face."""
+        if self.follow == "none":
+            return 0.0, 0.0, 0.0
+        if self.follow == "head" or (self.follow is None and of_head):
+            return self.head_travel(time)
         return self.travel(time)
 
 
@@ -127,6 +140,11 @@ class Showable(Protocol):
     def title(self) -> str:
         """Name of what is shown, "" for none."""
 
+    follow: str | None
+    """What the camera follows; see `Timed.follow`."""
+    orbit: float | None
+    """Seconds in which the camera turns once; None if it does not."""
+
     def show(self, name: str, on: object = True) -> None:
         """Set one of `fba_player.view.switches.SWITCHES`; ValueError for an unknown name or value."""
 
@@ -141,3 +159,6 @@ class Showable(Protocol):
 
     def head_travel(self, time: float) -> tuple[float, float, float]:
         """Return the displacement of the head from the start to a time, metres."""
+
+    def followed(self, time: float, *, of_head: bool = False) -> tuple[float, float, float]:
+        """Return the offset (x, y, z) of a camera at a time, metres. of_head: if it looks at the face."""

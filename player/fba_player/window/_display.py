@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from typing import Any
 
 from fba.errors import DisplayError
@@ -82,6 +84,64 @@ class FullScreen:
             if shared > most:
                 best, most = monitor, shared
         return best
+
+
+class _VisibilityEvent(ctypes.Structure):
+    """XVisibilityEvent of Xlib, filled up to the size of its largest event."""
+
+    _fields_ = (
+        ("type", ctypes.c_int),
+        ("serial", ctypes.c_ulong),
+        ("send_event", ctypes.c_int),
+        ("display", ctypes.c_void_p),
+        ("window", ctypes.c_ulong),
+        ("state", ctypes.c_int),
+        ("rest", ctypes.c_long * 24),
+    )
+
+
+class Covering:
+    """Whether other windows cover all of a window, where X11 says so; glfw has no name for it.
+
+    X11 says so unless a compositor draws the windows. Under Wayland the swap of pictures waits while a window
+    is covered, and nothing is needed; macOS and Windows are not asked.
+    """
+
+    _CHANGES, _NOTIFY, _FULL = 1 << 16, 15, 2
+    """VisibilityChangeMask, VisibilityNotify and VisibilityFullyObscured of X.h."""
+
+    def __init__(self, glfw: Any, window: Any) -> None:
+        self._covered = False
+        self._x11: Any = None
+        number = glfw.get_x11_window(window) if sys.platform == "linux" else None
+        if not number:
+            return
+        try:
+            self._x11 = ctypes.CDLL("libX11.so.6")
+        except OSError:
+            return
+        self._x11.XOpenDisplay.restype = ctypes.c_void_p
+        self._display = ctypes.c_void_p(self._x11.XOpenDisplay(None))
+        if not self._display:
+            self._x11 = None
+            return
+        self._x11.XSelectInput(self._display, ctypes.c_ulong(number), ctypes.c_long(self._CHANGES))
+
+    @property
+    def covered(self) -> bool:
+        """Whether nothing of the window can be seen."""
+        event = _VisibilityEvent()
+        while self._x11 is not None and self._x11.XPending(self._display):
+            self._x11.XNextEvent(self._display, ctypes.byref(event))
+            if event.type == self._NOTIFY:
+                self._covered = event.state == self._FULL
+        return self._covered
+
+    def close(self) -> None:
+        """Release its connection; safe to call twice."""
+        if self._x11 is not None:
+            self._x11.XCloseDisplay(self._display)
+        self._x11, self._covered = None, False
 
 
 def overlap(first: tuple[int, int, int, int], second: tuple[int, int, int, int]) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 import time as wall
 import warnings
 from collections.abc import Callable
@@ -10,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaWarning
+from fba_player.export.render import film_rate
 from fba_player.gl._context import (
     OPENGL,
     cure,
@@ -22,14 +25,14 @@ from fba_player.gl._framebuffer import Readback, Target
 from fba_player.gl._renderer import Renderer
 from fba_player.playback._transport import Transport
 from fba_player.playback.live import LiveTimeline
-from fba_player.session._captures import Captures, draw_screenshot
+from fba_player.session._captures import FILM_RATE, Captures, draw_screenshot
 from fba_player.session._controls import Controls
 from fba_player.session._pages import page_of
 from fba_player.session._session import Session
 from fba_player.session._source import Source
 from fba_player.view._camera import Camera
 from fba_player.view.protocols import Closing
-from fba_player.window._display import HOW_WITHOUT, FullScreen, start_glfw
+from fba_player.window._display import HOW_WITHOUT, Covering, FullScreen, start_glfw
 from fba_player.window._glfw_input import GlfwInput
 from fba_player.window._plain_overlay import Overlay, draw_opening
 
@@ -42,8 +45,12 @@ LOST = (
 )
 IDLE_SECONDS = 0.05
 """Seconds to wait for input while nothing moves."""
-MIN_PICTURE_SECONDS = 1 / 250
-"""Shortest time from one picture to the next, for displays that do not limit the rate."""
+HIDDEN_SECONDS = 0.25
+"""Seconds to wait for input while the window cannot be seen."""
+USUAL_RATE = 60
+"""Pictures a second of a display that does not say how many it shows."""
+LEAST_SHARE = 0.9
+"""Least time from one picture to the next, in periods of the display, which may set the pace itself."""
 WARNING_SECONDS = 12.0
 """Seconds for which warnings about the file are shown."""
 SETTLING_PICTURES = 4
@@ -86,6 +93,8 @@ class Window(Closing):
         self._window: Any = None
         self._problems: list[str] = []
         self._pictures_due, self._restless = SETTLING_PICTURES, False
+        self._next = self._least = 0.0
+        self._covering: Covering | None = None
         self._timeline = timeline
         self._arrived = timeline.arrived
         self._doubted = False
@@ -121,44 +130,74 @@ class Window(Closing):
         begun = wall.perf_counter()
         self._warn_of_bap_steps()
         arrived = self._timeline.arrived  # a live stream makes the timeline longer, also while paused
-        restless = session.restless
-        if restless or self._restless or session.source.probing or arrived != self._arrived:
+        playing = session.transport.playing
+        restless = session.restless or session.source.probing or arrived != self._arrived
+        if restless or (begun >= self._next if playing else self._restless):
             self._pictures_due, self._arrived = max(self._pictures_due, 1), arrived
-        self._restless = restless  # one more picture after everything has stopped
-        if self._pictures_due:
+        self._restless = restless or playing  # one more picture after everything has stopped
+        hidden = self._hidden
+        if hidden:
+            glfw.wait_events_timeout(HIDDEN_SECONDS)
+        elif self._pictures_due:
             glfw.poll_events()
         else:
-            glfw.wait_events_timeout(IDLE_SECONDS)
+            glfw.wait_events_timeout(min(self._next - begun, IDLE_SECONDS) if playing else IDLE_SECONDS)
         if glfw.window_should_close(self._window) and not session.closing:
             session.leave()
             glfw.set_window_should_close(self._window, session.closing)
             self._redraw()
         if session.closing:
             return False
-        if not self._pictures_due:
+        if hidden or not self._pictures_due:
             return True
         size = self._framebuffer()
         if size[0] < 1 or size[1] < 1:  # minimised
-            glfw.wait_events_timeout(IDLE_SECONDS)
+            glfw.wait_events_timeout(HIDDEN_SECONDS)
             return True
         self._pictures_due -= 1
         self._draw_checked(size)
         glfw.swap_buffers(self._window)
         self.pictures += 1
-        left = MIN_PICTURE_SECONDS - (wall.perf_counter() - begun)
+        self._next = begun + self._seconds_to_next()
+        least = self._least if session.recording is None else 1 / FILM_RATE
+        left = least - (wall.perf_counter() - begun)
         if left > 0:
             wall.sleep(left)
         return True
 
+    @property
+    def _hidden(self) -> bool:
+        """Whether no picture is needed, because nobody can see it and nothing records it."""
+        session = self.session
+        if session.recording is not None or "take" in session.rolling or session.requests:
+            return False
+        minimised = bool(self._glfw.get_window_attrib(self._window, self._glfw.ICONIFIED))
+        return minimised or (self._covering is not None and self._covering.covered)
+
+    def _seconds_to_next(self) -> float:
+        """Return the seconds from one picture to the next while nothing but the performance moves.
+
+        Frame by frame, there is one for each frame; in a window without the focus, as many as a film would
+        have; else as many as the display shows.
+        """
+        transport = self.transport
+        if not transport.interpolate:
+            return min(transport.until_next_frame, HIDDEN_SECONDS)
+        if not self._glfw.get_window_attrib(self._window, self._glfw.FOCUSED):
+            return float(1 / film_rate(self._timeline.rate))
+        return 0.0
+
     def close(self) -> None:
         """Finish a film, close the window and release its resources; safe to call twice."""
         try:
+            self.session.exports.cancel()
             self.captures.close()
         finally:
-            for part in (self._gui, self._overlay, self._renderer, self._target, self._readback):
+            parts = (self._covering, self._gui, self._overlay, self._renderer, self._target, self._readback)
+            for part in parts:
                 if part is not None:
                     part.close()
-            self._gui = self._overlay = self._renderer = self._target = self._readback = None
+            self._covering = self._gui = self._overlay = self._renderer = self._target = self._readback = None
             if self._gl is not None:
                 self._gl.release()
                 self._gl = None
@@ -190,6 +229,9 @@ class Window(Closing):
             )
         glfw.make_context_current(self._window)
         glfw.swap_interval(1)
+        self._covering = Covering(glfw, self._window)
+        rates = [glfw.get_video_mode(monitor).refresh_rate for monitor in glfw.get_monitors()]
+        self._least = LEAST_SHARE / max([*rates, USUAL_RATE])
         try:
             self._gl = moderngl.create_context(require=330)
         except Exception as error:
@@ -261,8 +303,9 @@ class Window(Closing):
                 self._target.close()
             self._target = Target(self._gl, size, samples=0)
         assert self._renderer is not None
-        time = self.transport.time
+        session.exports.poll()
         self.captures.begin_picture()
+        time = self.transport.time
         self._target.begin()
         within = self._renderer.draw(session.view(time), session.camera(time), size)
         self._target.finish(self._gl.screen, within)
@@ -296,6 +339,8 @@ class Window(Closing):
                 self.captures.toggle_recording()
             elif request == "fullscreen":
                 self._full_screen.toggle()
+            elif request == "copy_command":
+                self._copy_command()
             self._redraw()
 
     def _screenshot(self, *, transparent: bool) -> None:
@@ -306,6 +351,16 @@ class Window(Closing):
             self.session.say(f"No picture could be drawn: {error}", "error", 8.0)
             return
         self.captures.screenshot(pixels, transparent=transparent)
+
+    def _copy_command(self) -> None:
+        """Put the command that draws this picture onto the clipboard, and show it."""
+        session, time = self.session, self.transport.time
+        name = os.path.abspath(session.source.path) if session.source.path is not None else "FILE"
+        options = {"time": f"{time:.3f}", **session.viewpoint.options()}
+        given = " ".join(f"--{option} {value}" for option, value in options.items())
+        text = f"fba render {shlex.quote(name)} -o picture.png {given}"
+        self._glfw.set_clipboard_string(self._window, text)
+        session.say(f"Copied: {text}", seconds=8.0, about="command")
 
     def _show_title(self) -> None:
         if page_of(self.session) is not None:

@@ -1,15 +1,19 @@
-"""Windows for one task: placing the feature points of a head, and mapping captured markers onto one."""
+"""Windows for one task: feature points on a head or on photographs, captured markers on a head."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
 from fba.atomic import PathLike
 from fba.errors import DisplayError
+from fba.face.fitting import Photograph
 from fba.face.importers.head_surface import HeadSurface
 from fba_player.gl._context import cure
+from fba_player.scene._photo_editing import PhotoEditing, Spot
+from fba_player.scene._photo_scene import PhotoScene
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.scene.marker_editing import MarkerEditing
@@ -17,7 +21,7 @@ from fba_player.scene.markers_scene import MarkersScene
 from fba_player.window._display import check_display
 from fba_player.window._window import Window
 
-Subject = Literal["points", "markers"]
+Subject = Literal["points", "markers", "photos"]
 
 SIZE = (1280, 800)
 """Width and height of a window, by default."""
@@ -31,6 +35,10 @@ INSTEAD: dict[Subject, str] = {
     "markers": (
         "Without a window, `fba markers CAPTURE -o FILE.toml` writes the proposed mapping, to be changed in "
         "an editor; -o FILE.png draws what it does"
+    ),
+    "photos": (
+        'Without a window, write the file by hand: {"front": {"points": {"3.5": [x, y], ...}}}, in pixels '
+        "from the top left of the picture, and run `fba model photos FRONT --points FILE`"
     ),
 }
 """What to do where no window can be opened."""
@@ -89,4 +97,31 @@ def open_markers(editing: MarkerEditing, title: str, *, size: tuple[int, int] = 
     count = sum(name in editing.placed for name in names)
     text = f"{count} of {len(names)} markers are on the head: check them"
     window.session.say(text, seconds=NOTICE_SECONDS)
+    return window
+
+
+def place_photo_points(
+    photographs: Sequence[Photograph],
+    places: Mapping[str, Mapping[str, Spot]],
+    path: PathLike,
+    *,
+    size: tuple[int, int] = SIZE,
+) -> PhotoEditing:
+    """Show photographs in a window until it is closed; the user drags points and saves them as `path`.
+
+    places: the first positions by view, "front" and "side", and name of the point. Returns the points;
+    `written` says whether they were saved. Raises DisplayError without a display, OpenGL or imgui.
+    """
+    editing = PhotoEditing(photographs, places, Path(path))
+    with open_photos(editing, size=size) as window:
+        window.run()
+    return editing
+
+
+def open_photos(editing: PhotoEditing, *, size: tuple[int, int] = SIZE) -> Window:
+    """Return the window for points on photographs, opened but not yet shown: `run` shows it."""
+    scene = PhotoScene(editing)
+    window = Window(scene, title=f"{scene.title}: points", size=size)
+    window.session.open.add("photos")
+    window.session.say("Drag the points to where they belong; Ctrl+S saves them", seconds=NOTICE_SECONDS)
     return window

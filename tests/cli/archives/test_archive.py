@@ -85,3 +85,20 @@ def test_wrong_usage_of_archives(
     assert result[0] == code
     assert message in " ".join(result[2].split())
     assert not Path("out").exists()
+
+
+def test_an_archive_by_its_address(run: Run, takes: Path, tmp_path: Path) -> None:
+    pytest.importorskip("fsspec")
+    out = f"file://{tmp_path}/far/archive"
+    code, printed, _ = run("archive", "make", takes / "anna", "-o", out, "--jobs", 1)
+    assert (code, printed) == (0, f"{out}: 1 performances added, 0 there before, 0 failed\n")
+    assert [path.suffix for path in (tmp_path / "far" / "archive").iterdir()] == [".parquet"]
+    assert json.loads(run("archive", "info", out, "--json")[1])["performances"] == 1
+    assert f"{out}: 1 performances intact" in run("archive", "verify", out, "--jobs", 2)[1]
+    assert f"{out}: 1 performances described" in run("archive", "index", out, "--jobs", 1)[1]
+    assert run("archive", "query", out, "seconds > 1", "--json")[0] == 0
+    assert run("archive", "extract", out, "-o", tmp_path / "back")[0] == 0
+    assert fba.read(tmp_path / "back" / "one.fba") == fba.read(takes / "anna" / "one.fap")
+    code, _, err = run("archive", "info", f"file://{tmp_path}/none")
+    assert (code, err) == (1, f"fba: error: file://{tmp_path}/none: holds no shards (shard-*.parquet); "
+                              "`fba archive make` writes them\n")  # fmt: skip

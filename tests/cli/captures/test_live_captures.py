@@ -13,9 +13,11 @@ import pytest
 
 import fba
 import fba.live.receiver
+from fba.cli.main import main
 from fba.face import resolve
 from fba.live import Receiver
 from fba.parameters import fap_numbers
+from fba.serving import split_stream
 from tools.captures.face_files import datagram
 
 Run = Callable[..., Any]
@@ -94,6 +96,31 @@ def test_a_capture_at_a_bit_rate(run: Run, arriving: Arriving, tmp_path: Path) -
     assert "--quant and --bitrate contradict each other" in said.err
     said = run("capture", "livelink", "-o", path, "--buffer", "2s")
     assert "--buffer goes with --bitrate" in said.err
+
+
+def test_a_pipe_gets_a_stream_that_may_be_entered_anywhere(
+    arriving: Arriving, capsysbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    """As `fba send -` wants it, whose receivers may lose packets: with an I plane every two seconds."""
+    arriving(telephone(300, junk=b""))
+    words = [
+        "capture",
+        "livelink",
+        "--port",
+        str(free_port()),
+        "--host",
+        LOCAL,
+        "-o",
+        "-",
+        "--seconds",
+        "0.3",
+    ]
+    with pytest.raises(SystemExit):
+        main(words)
+    stream = capsysbinary.readouterr().out
+    planes, _ = split_stream(stream, "visage")
+    assert len(planes) == 300
+    assert [number for number, plane in enumerate(planes) if plane.opening] == [0, 120, 240]
 
 
 def test_a_compact_capture_shows_the_same_with_less(run: Run, arriving: Arriving, tmp_path: Path) -> None:

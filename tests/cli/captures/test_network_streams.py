@@ -161,6 +161,7 @@ def test_the_description_that_is_written(run: Run, tmp_path: Path) -> None:
         ("send {file} tcp://127.0.0.1:5004 --sdp a.sdp", "--sdp describes streams by RTP"),
         ("send {file} udp://127.0.0.1:5004 --payload 6416", "--payload is for RTP"),
         ("send - rtp://127.0.0.1:5004 --loop", "--loop repeats a file"),
+        ("send {file} rtp://127.0.0.1:5004 --live", "--live goes with standard input"),
         ("send {file} rtp://no.such.host.invalid:5004", "cannot be sent to"),
         ("capture rtp://127.0.0.1:5004", "give -o OUT.fba to record"),
         ("capture rtp://127.0.0.1 -o a.fba", "expected rtp://HOST:PORT"),

@@ -16,7 +16,7 @@ from fba.face.gltf._storage import build
 from fba.face.model import PART_KINDS, FaceModel
 from fba.parameters import faps, feature_points
 from json_places import put
-from stored_models import face, models
+from stored_models import face, face_with_level, models
 
 jsonschema = pytest.importorskip("jsonschema")
 SCHEMA: dict[str, Any] = json.loads((files("fba.face") / "fba_face.schema.json").read_text(encoding="utf-8"))
@@ -49,7 +49,7 @@ def test_names_are_those_of_the_tables() -> None:
 
 
 def test_a_face_follows_the_schema() -> None:
-    content = written(face())
+    content = written(face_with_level())
     validator().validate(content)
     assert set(content) == set(SCHEMA["properties"])
 

@@ -21,7 +21,7 @@ from fba.face.gltf._storage import build, load
 from fba.face.model import FaceModel
 from fba.gltf._document import join_container, parse_document, split_container
 from json_places import REMOVED, put
-from stored_models import assert_same, face
+from stored_models import assert_same, face, face_with_level
 
 
 @cache
@@ -119,6 +119,44 @@ def test_the_error_names_the_place(place: str, value: Any, message: str) -> None
 
 def test_the_good_file_is_good() -> None:
     assert_same(read(file()), face())
+
+
+LEVELS: list[tuple[str, Any, str]] = [
+    ("", {}, "expected a list"),
+    ("", [{}] * 17, "17 elements, more than the 16"),
+    ("/0/model", REMOVED, r"levels\[0\]: 'model' is missing"),
+    ("/0/model", 0, "level 1: is not glTF 2.0"),
+    ("/0/model", 10**6, r"levels\[0\].model: 1000000 is not within"),
+    ("/0/parents", REMOVED, r"levels\[0\]: 'parents' is missing"),
+    ("/0/parents", 0, r"levels\[0\].parents: "),
+]
+
+
+@pytest.mark.parametrize(("place", "value", "message"), LEVELS, ids=[f"{p}-{m}" for p, _, m in LEVELS])
+def test_damaged_levels_are_refused(place: str, value: Any, message: str) -> None:
+    text, binary = split_container(build(face_with_level()).glb(), "head.glb")
+    root = json.loads(bytes(text))
+    put(root, f"{FACE}/levels{place}", value)
+    assert binary is not None
+    with pytest.raises(ModelError, match=rf"^head\.glb: (?:.*){message}"):
+        read(join_container(json.dumps(root).encode(), bytes(binary)))
+
+
+def test_levels_within_levels_are_refused_before_they_are_read() -> None:
+    """Otherwise a small file could hold a long chain of models."""
+    inner = face_with_level()
+    builder = build(face())
+    level = {"model": builder.blob(build(inner).glb()), "parents": builder.packed(inner.levels[0].parents)}
+    builder.root["extensions"]["FBA_face"]["levels"] = [level]
+    with pytest.raises(ModelError, match=r"head\.glb: level 1: .*a level of detail has no levels itself"):
+        read(builder.glb())
+
+
+def test_a_level_is_read_as_it_was_written() -> None:
+    again = read(build(face_with_level()).glb())
+    assert_same(again, face())
+    assert_same(again.levels[0].model, face())
+    np.testing.assert_array_equal(again.levels[0].parents, np.arange(len(again.vertices)))
 
 
 def packed_again(which: str, content: bytes) -> bytes:

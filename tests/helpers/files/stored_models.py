@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -14,7 +15,7 @@ from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTra
 from fba.face.feature_points import names, neutral_points
 from fba.face.interpolation._terms import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
-from fba.face.model import PART_KINDS, FaceModel, Material, Part
+from fba.face.model import PART_KINDS, DetailLevel, FaceModel, Material, Part
 from fba.parameters import faps, point_rows
 
 UNITS_NEED = ("3.1", "3.2", "3.3", "3.4", "3.5", "3.6", "9.15", "2.2", "8.3", "8.4")
@@ -73,6 +74,12 @@ def face(**changes: Any) -> FaceModel:
     }
     settings |= changes
     return FaceModel(**settings)
+
+
+def face_with_level() -> FaceModel:
+    """The same face with a level of detail, which is as fine as itself."""
+    full = face()
+    return replace(full, levels=(DetailLevel(full, np.arange(len(full.vertices))),))
 
 
 def ball(name: str, kind: str, centre: np.ndarray, material: Material) -> Part:

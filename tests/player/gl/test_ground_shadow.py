@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fba.compiled import is_compiled
+from fba.mesh.simplify import DetailLevels
 from fba_player._mesh.primitives import sphere_mesh
-from fba_player._mesh.simplify import DetailLevels
 from fba_player.gl._ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
 from fba_player.view._view import FaceMesh, FaceShape
 

@@ -211,6 +211,20 @@ def test_a_stream_that_is_cut_off_shows_what_is_there(wire: Wire) -> None:
     assert "ends inside" in live.details
 
 
+def test_words_of_the_source_stay(wire: Wire) -> None:
+    """A receiver knows which packets are lost; the decoder only sees that frames are missing."""
+    data, ends = stream(performance(200), intra_period=1, start_codes=True)
+    live = LiveAnimation(wire.out)
+    wire.send(data[: ends[60]])
+    assert live.wait(20)
+    live.tell("packets lost, 3 so far: the pose is held")
+    wire.send(data[ends[60] + 3 :])
+    wire.end()
+    assert live.wait_end(20)
+    assert "lost at byte" in live.details
+    assert live.message == "packets lost, 3 so far: the pose is held"
+
+
 def test_damage_is_stepped_over_and_told(wire: Wire) -> None:
     data, ends = stream(performance(200), intra_period=1, start_codes=True)
     broken = bytearray(data)

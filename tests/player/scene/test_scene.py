@@ -11,8 +11,9 @@ import pytest
 from fba.animation import Animation
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel
-from fba.parameters import point_rows
+from fba.parameters import BAP_COUNT, point_rows
 from fba.player import Scene, default_camera
+from fba.tracks import BodyTrack
 from fba_player._figure._face_parts import compute_sway
 from fba_player._figure.face import FaceFigure, build_figure
 from player_tracks import body_track, face_track
@@ -183,3 +184,26 @@ def test_a_real_stream(shared: Path) -> None:
     neutral, joy = (scene.timeline.faps(frame / 30) for frame in (0, 150))
     assert not neutral.any()
     assert joy[12 - 1] > 200  # corners of the lips go up at full joy
+
+
+def test_the_camera_follows_what_it_is_told_to(walking: Animation) -> None:
+    scene = Scene(walking)
+    assert scene.followed(0.3) == (0.0, 0.0, 0.0)  # nobody walks away
+    assert scene.followed(0.3, of_head=True) == scene.head_travel(0.3)
+    scene.follow = "head"
+    assert scene.followed(0.3) == scene.head_travel(0.3)
+    scene.follow = "none"
+    assert scene.followed(0.3, of_head=True) == (0.0, 0.0, 0.0)
+
+
+def test_the_hips_stay_in_the_middle_of_the_picture() -> None:
+    steps = np.zeros((10, BAP_COUNT), np.int32)
+    steps[:, 181] = np.arange(10) * 100  # millimetres to the left
+    mask = np.zeros((10, BAP_COUNT), bool)
+    mask[:, 180:183] = True
+    scene = Scene(Animation(25, np.arange(10), body=BodyTrack(steps, mask)))
+    assert scene.travel(0.3) == (0.0, 0.0, 0.0)
+    scene.follow = "hips"
+    start, later = (np.array(scene.travel(time)) for time in (0.0, 0.36))
+    np.testing.assert_allclose(start, 0.0, atol=1e-9)
+    assert np.abs(later).max() == pytest.approx(0.9)

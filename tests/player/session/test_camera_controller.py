@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from fba.animation import Animation
 from fba_player.scene.scene import Scene
-from fba_player.session._camera_controller import GLIDE_SECONDS, Viewpoint
-from fba_player.view._camera import PRESETS, Camera
+from fba_player.session._camera_controller import GLIDE_SECONDS, ORBIT_SECONDS, Viewpoint
+from fba_player.view._camera import Camera
+from fba_player.view.protocols import Timed
 from set_clock import Clock
 
 
-class Walking:
+class Walking(Timed[Any]):
     """A scene in which somebody walks two metres a second along x."""
 
     def camera(self, preset: str | None = None, aspect: float = 1.0) -> Camera:
@@ -68,15 +71,58 @@ def test_between_cameras_it_takes_the_shorter_way() -> None:
 def test_it_follows_and_stays_without_a_jump(clock: Clock) -> None:
     viewpoint = Viewpoint(Walking(), 1.0, Camera(), clock=clock)  # type: ignore[arg-type]
     assert viewpoint.camera_at(3.0).target == (6.0, 0.0, 0.0)
-    viewpoint.toggle_follow(3.0)
+    viewpoint.follow = "none"
     assert viewpoint.camera_at(3.0).target == (6.0, 0.0, 0.0)
     assert viewpoint.camera_at(4.0).target == (6.0, 0.0, 0.0)
-    viewpoint.toggle_follow(4.0)
+    viewpoint.follow = None
     assert viewpoint.camera_at(4.0).target == (6.0, 0.0, 0.0)
     assert viewpoint.camera_at(5.0).target == (8.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("preset", [*PRESETS, None])
+def test_it_turns_around_the_figure_and_stays_where_it_is(clock: Clock) -> None:
+    viewpoint = Viewpoint(Walking(), 1.0, Camera(yaw=10), clock=clock)  # type: ignore[arg-type]
+    viewpoint.toggle_orbit()
+    assert viewpoint.gliding
+    assert viewpoint.camera_at(0.0).yaw == pytest.approx(10)
+    clock.now += ORBIT_SECONDS / 4
+    assert viewpoint.camera_at(0.0).yaw == pytest.approx(100)
+    assert "turn=100," in viewpoint.options()["camera"]
+    assert viewpoint.options()["orbit"] == f"{ORBIT_SECONDS:g}"
+    viewpoint.toggle_orbit()
+    clock.now += 3.0
+    assert not viewpoint.gliding
+    assert viewpoint.camera_at(0.0).yaw == pytest.approx(100)
+
+
+def test_a_view_of_the_face_follows_the_head(walking: Animation, clock: Clock) -> None:
+    scene = Scene(walking)
+    viewpoint = Viewpoint(scene, 1.5, clock=clock)
+    whole = viewpoint.camera_at(0.2)
+    viewpoint.preset("face")
+    begun = viewpoint.camera_at(0.2)
+    assert begun.target == pytest.approx(whole.target)  # it begins where it was
+    clock.now += GLIDE_SECONDS
+    moved = np.subtract(viewpoint.camera_at(0.2).target, scene.camera("face", 1.5).target)
+    np.testing.assert_allclose(moved, scene.head_travel(0.2), atol=1e-9)
+    assert viewpoint.options()["follow"] == "head"
+
+
+def test_a_view_fits_again_where_the_bar_is_hidden(talking: Animation, clock: Clock) -> None:
+    scene = Scene(talking)
+    viewpoint = Viewpoint(scene, 1.6, "front", clock=clock)
+    viewpoint.covered = 0.2
+    viewpoint.refit()
+    clock.now += GLIDE_SECONDS
+    above = viewpoint.camera
+    assert above.distance > scene.camera("front", 1.6).distance
+    viewpoint.covered = 0.0
+    viewpoint.refit()
+    assert viewpoint.gliding
+    clock.now += GLIDE_SECONDS
+    assert viewpoint.camera == scene.camera("front", 1.6)
+
+
+@pytest.mark.parametrize("preset", ["front", "three-quarter", "profile", "body", "side", "back", None])
 def test_views_fit_above_what_is_covered(talking: Animation, clock: Clock, preset: str | None) -> None:
     scene = Scene(talking)
     viewpoint = Viewpoint(scene, 1.6, clock=clock)

@@ -12,7 +12,7 @@ import pytest
 from fba.animation import Animation
 from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
-from fba_player.session._captures import Captures
+from fba_player.session._captures import FILM_RATE, Captures
 from fba_player.session._session import Session
 from fba_player.sound.soundtrack import FilmSound
 from player_tracks import face_track
@@ -21,8 +21,8 @@ from sound_clicks import click_time, sound, write_click
 
 av = pytest.importorskip("av")
 
-RATE = 60
-"""Pictures a second of the window."""
+RATE = FILM_RATE
+"""Pictures a second of the window: each is a frame of the film."""
 CLICK = 0.5
 """Seconds in the sound."""
 EXACT = 0.006
@@ -41,15 +41,12 @@ class Filmed:
         self.session.sound = wav
         self.captures = Captures(self.session, folder)
         self.captures.toggle_recording()
-        recorder = self.captures._recorder
-        assert recorder is not None
-        add = recorder.add  # these pictures come faster than any window's: none is to be left out
-        recorder.add = lambda pixels, time=None, *, wait=True: add(pixels, time)  # type: ignore[method-assign]
 
-    def go_on(self, seconds: float) -> None:
+    def go_on(self, seconds: float, slowness: float = 1.0) -> None:
+        """Draw seconds of the film. slowness: seconds that the machine takes for each of them."""
         pixels = np.zeros((32, 32, 4), np.uint8)
         for _ in range(round(seconds * RATE)):
-            self.clock.now += 1 / RATE
+            self.clock.now += slowness / RATE
             self.captures.begin_picture()
             self.captures.add_picture(lambda: lambda: pixels)
 
@@ -77,6 +74,24 @@ def test_what_is_played_is_heard_when_it_was_seen(filmed: Callable[[], Filmed]) 
         shown = [float(frame.time) for frame in film.decode(video=0)]
     assert len(samples) / rate == pytest.approx(shown[-1] + 1 / 30, abs=2 * 1024 / rate)
     assert shown[-1] == pytest.approx(1.2, abs=0.04)
+
+
+def test_a_slow_machine_makes_the_same_film(filmed: Callable[[], Filmed]) -> None:
+    """Where a picture took 0.08 s, the film had 13 pictures a second; now what is shown slows down."""
+    one = filmed()
+    one.go_on(0.3, slowness=2.4)
+    one.session.transport.play()
+    one.go_on(0.9, slowness=2.4)
+    assert one.session.recording == pytest.approx(1.2)
+    assert one.session.recording_speed == pytest.approx(1 / 2.4)
+    assert one.session.transport.time == pytest.approx(0.9)
+    path = one.film()
+    assert one.session.clock is one.clock  # time goes on as before
+    one.clock.now += 0.5
+    assert one.session.transport.time == pytest.approx(1.4)
+    assert click_time(path) == pytest.approx(0.3 + CLICK, abs=EXACT)
+    with av.open(str(path)) as film:
+        assert [round(frame.time * RATE) for frame in film.decode(video=0)] == list(range(36))
 
 
 def test_a_jump_while_playing_is_heard_as_a_jump(filmed: Callable[[], Filmed]) -> None:

@@ -149,7 +149,7 @@ def test_the_whole_tab_is_seen_and_no_label_covers_another(studio: Studio, size:
     assert set(tab.sliders) == set(COMMON)
     labels = list(tab.labels.items())
     for number, (name, box) in enumerate(labels):
-        assert box[3] - box[1] == EMOTION_TEXT
+        assert box[3] - box[1] == pytest.approx(EMOTION_TEXT)
         assert tab.plane[0] - 10 <= box[0] < box[2] <= tab.plane[2] + 10, name
         for other in known_points():
             x, y = place(studio, other)

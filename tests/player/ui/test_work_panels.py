@@ -170,6 +170,30 @@ def test_the_bit_rate_of_a_stream_that_arrives(opengl: None, talking: Animation)
         assert not (warm[:, wide // 8 :] > 60).any()
 
 
+def test_losses_are_told_while_the_bar_is_hidden(opengl: None, talking: Animation) -> None:
+    from io import BufferedReader, BytesIO
+
+    from fba_player.playback.live import LiveAnimation, LiveTimeline
+
+    live = LiveAnimation(BufferedReader(BytesIO(fba.encode(talking))))  # type: ignore[arg-type]
+    assert live.wait_end(20)
+    now = [100.0]
+    scene = Scene(live, timeline=LiveTimeline(live))  # type: ignore[arg-type]
+    transport = Transport(scene.timeline, loop=True, clock=lambda: now[0])
+    session = Session(scene, transport, source=Source(scene), size=SIZE, clock=lambda: now[0])  # type: ignore[arg-type]
+    with Studio(session) as studio:
+        studio.gui.hides = True
+        transport.play()
+        for words, shown in (("", 0.0), ("packets lost, 3 so far: the pose is held", 1.0)):
+            now[0] += 60
+            live.tell(words)
+            studio.settle(30)
+            assert studio.gui.shown == shown
+        now[0] += 60
+        studio.settle(30)
+        assert studio.gui.shown == 0.0
+
+
 def test_the_bit_rate_of_what_is_no_stream_yet(opened: Opened, talking: Animation) -> None:
     studio = opened(talking)
     studio.session.open.add("rate")
@@ -451,3 +475,15 @@ def test_escape_leaves_the_full_screen_first(opened: Opened, talking: Animation)
     session.full_screen = True
     session.escape()
     assert (list(session.requests), session.closing) == (["fullscreen"], False)
+
+
+def test_escape_closes_the_help_and_ends_a_film_before_the_window(opened: Opened, talking: Animation) -> None:
+    session = opened(talking, "help").session
+    session.recording = 1.0
+    session.escape()
+    assert ("help" in session.open, list(session.requests)) == (False, [])
+    session.escape()
+    assert (list(session.requests), session.closing) == (["record"], False)
+    session.recording = None
+    session.escape()
+    assert session.closing

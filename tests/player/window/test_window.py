@@ -164,16 +164,76 @@ def test_any_size_is_drawn_with_all_panels_open(
         assert window._gl.error == "GL_NO_ERROR"
 
 
-def test_minimised_it_waits_and_goes_on(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def hide(window: Window, monkeypatch: pytest.MonkeyPatch, attribute: int) -> None:
+    """Let glfw say of the window what a window manager would: there is none on the virtual display."""
+    ask = glfw.get_window_attrib
+    monkeypatch.setattr(
+        glfw,
+        "get_window_attrib",
+        lambda w, what: what == attribute or (what != glfw.ICONIFIED and ask(w, what)),
+    )
+
+
+@pytest.mark.parametrize("how", ["as X11 does", "as Windows does"])
+def test_minimised_it_waits_and_goes_on(window: Window, monkeypatch: pytest.MonkeyPatch, how: str) -> None:
     window.transport.play()
     before = window.pictures
     with monkeypatch.context() as minimised:
-        minimised.setattr(window, "_framebuffer", lambda: (0, 0))
+        if how == "as X11 does":
+            hide(window, minimised, glfw.ICONIFIED)
+        else:
+            minimised.setattr(window, "_framebuffer", lambda: (0, 0))
         for _ in range(3):
             assert window.update()
         assert window.pictures == before
+        assert window.transport.playing
+    window._redraw()
     assert window.update()
     assert window.pictures == before + 1
+
+
+def test_minimised_it_still_records(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("av")
+    hide(window, monkeypatch, glfw.ICONIFIED)
+    window.session.request("record")
+    window._redraw()
+    until(window, lambda: (window.session.recording or 0.0) > 0.1)
+    window.session.request("record")
+    until(window, lambda: window.session.recording is None)
+    assert list(window.captures.folder.glob("*.mp4"))
+
+
+def test_covered_by_another_window_it_waits(window: Window) -> None:
+    window.transport.play()
+    x, y = glfw.get_window_pos(window._window)
+    glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
+    glfw.window_hint(glfw.FOCUSED, False)
+    over = glfw.create_window(900, 700, "over", None, None)
+    glfw.set_window_pos(over, x - 20, y - 20)
+    glfw.poll_events()
+    until(window, lambda: window._hidden)
+    before = window.pictures
+    for _ in range(3):
+        assert window.update()
+    assert window.pictures == before
+    glfw.destroy_window(over)
+    until(window, lambda: window.pictures > before)
+
+
+def test_frame_by_frame_it_draws_one_picture_for_each_frame(
+    window: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fba_player.window._window.wall.perf_counter", lambda: now[0])
+    now = [window._last + 10.0]
+    window.transport.use_clock(lambda: now[0])
+    window.transport.interpolate = False
+    window.transport.play()
+    settle(window)
+    before = window.pictures
+    for _ in range(40):  # 0.2 s in steps of 5 ms: five frames
+        now[0] += 0.005
+        window.update()
+    assert 5 <= window.pictures - before <= 7
 
 
 def test_a_lost_context_ends_with_an_explanation(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -99,7 +99,7 @@ class _Coding:
         return self.preset == "compact"
 
     def recorder(self, targets: list[Target], *, served: bool) -> StreamRecorder:
-        """Return the encoder that writes frames to the targets. served: whether viewers come and go."""
+        """Return the encoder that writes frames to the targets. served: for viewers who come later."""
         from fba.live import StreamRecorder
 
         return StreamRecorder(
@@ -235,7 +235,8 @@ def _capture(
     from fba.live import Capture, Receiver
 
     network = request.network
-    recorder = request.coding.recorder(targets, served=request.serve is not None)
+    piped = request.output == STANDARD and request.coding.bit_rate is None  # to `fba send -`, for example
+    recorder = request.coding.recorder(targets, served=piped or request.serve is not None)
     capture = Capture(
         kind, recorder.push, sender=network.sender, rate=request.rate, swap=request.swap,
         neutral=request.neutral, say=lambda text: click.echo(f"fba: {text}", err=True),

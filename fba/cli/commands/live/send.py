@@ -54,7 +54,7 @@ class _Stream:
         "fba send talk.fba rtp://192.168.0.20:5004",
         "fba send talk.fba rtp://239.1.2.3:5004 --sdp talk.sdp --loop",
         "fba send talk.fba tcp://192.168.0.20:5004",
-        "nc host 7000 | fba send - rtp://192.168.0.20:5004",
+        "fba send - --live rtp://192.168.0.20:5004",
         "fba send talk.fba 127.0.0.1:11111 --name Anna --loop",
     ),
 )
@@ -67,6 +67,11 @@ def command(
     stream: _Stream,
     name: str | None = option(help='Name of the subject, for receivers of Live Link Face. Default: "fba".'),
     loop: bool = option(default=False, help="Start again at the end."),
+    live: bool = option(
+        default=False,
+        help="Send what comes on standard input at once. Without it, planes wait for their time, counted "
+        "from the first, so that a stream that comes faster is sent at its own pace.",
+    ),
     seconds: Fraction | None = option(
         type=options.PERIOD, metavar="SECONDS", help="Stop after that; default: at the end."
     ),
@@ -83,10 +88,12 @@ def command(
     the tables that `fba decode` writes. The port is 11111 by default.
     """
     limit_seconds = None if seconds is None else float(seconds)
+    if live and str(file) != "-":
+        raise click.UsageError("--live goes with standard input (-): a file is sent at its own pace")
     if "://" in address:
         if name is not None:
             raise click.UsageError("--name is for receivers of Live Link Face, whose address has no ://")
-        _send_stream(file, address, stream, reading, loop=loop, seconds=limit_seconds)
+        _send_stream(file, address, stream, reading, loop=loop, live=live, seconds=limit_seconds)
         return
     for option_name in ("payload", "planes_per_packet", "sdp"):
         if options.is_given(option_name):
@@ -102,7 +109,7 @@ def command(
 
 
 def _send_stream(
-    file: Path, text: str, stream: _Stream, reading: Reading, *, loop: bool, seconds: float | None
+    file: Path, text: str, stream: _Stream, reading: Reading, *, loop: bool, live: bool, seconds: float | None
 ) -> None:
     """Send planes of a file, or of standard input."""
     from fba.live.addresses import parse_address
@@ -125,7 +132,7 @@ def _send_stream(
     sender = StreamSender(address, kind=stream.payload, planes_per_packet=stream.planes_per_packet)
     with sender, stopping(pace.stop):
         count = 0
-        for plane, time in _timed(planes, reading, pace, loop=loop):
+        for plane, time in _timed(planes, reading, pace, loop=loop, live=live):
             if not count:
                 _describe(outputs, file, address, stream, plane)
             sender.send(plane, time)
@@ -136,7 +143,7 @@ def _send_stream(
 
 
 def _timed(
-    planes: list[Plane] | None, reading: Reading, pace: Pacer, *, loop: bool
+    planes: list[Plane] | None, reading: Reading, pace: Pacer, *, loop: bool, live: bool
 ) -> Iterator[tuple[Plane, float]]:
     from fba.live.streams import repeated
     from fba.serving import arriving
@@ -145,7 +152,7 @@ def _timed(
         yield from repeated(planes, pace, loop=loop)
         return
     read, splitter = live_streams.piped_planes(reading)
-    for plane in arriving(read, splitter, pace):
+    for plane in arriving(read, splitter, pace, live=live):
         yield plane, plane.time
 
 

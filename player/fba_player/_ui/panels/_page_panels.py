@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Generic
 from imgui_bundle import imgui
 
 from fba.capture.virtual_markers.mapping import ASSIGNMENTS, OVERLAPS
+from fba.parameters import feature_points, point_rows
 from fba_player._ui import theme
 from fba_player._ui.panels.panel import (
     Panel,
@@ -19,9 +20,19 @@ from fba_player._ui.panels.panel import (
     tooltip,
     wrapped,
 )
+from fba_player.scene._photo_editing import PhotoEditing
 from fba_player.scene._point_placement import MATES, PointPlacement, describe_point
 from fba_player.scene.marker_editing import MarkerEditing
-from fba_player.session._pages import MARKER_KEYS, MARKING, PLACING, POINT_KEYS, Edited, Page
+from fba_player.session._pages import (
+    MARKER_KEYS,
+    MARKING,
+    PHOTO_KEYS,
+    PHOTOS,
+    PLACING,
+    POINT_KEYS,
+    Edited,
+    Page,
+)
 from fba_player.session._session import Session
 
 MIN_REACH = 0.02
@@ -154,6 +165,42 @@ def _draw_parts(placement: PointPlacement) -> None:
             placement.hidden.discard(number)
         elif changed:
             placement.hidden.add(number)
+
+
+class PhotosPanel(EditingPanel[PhotoEditing]):
+    """All points of the photographs; a click on one makes it the current one."""
+
+    name, title, label = "photos", "Points on photographs", "Points"
+    width, height = 340.0, 2000.0
+    page, list_height = PHOTOS, 0.45
+
+    def draw_editing(self, session: Session, editing: PhotoEditing) -> None:
+        view, name = editing.current.split()
+        sized(name, theme.LARGE, theme.ACCENT)
+        wrapped(feature_points()[point_rows()[name]].description)
+        wrapped(
+            "in the profile, the side that is seen" if view == "side" else "in the frontal picture",
+            theme.FAINT,
+        )
+        rows = (
+            (("Previous", "previous", True), ("Next", "next", True),
+             ("Next missing", "missing", bool(editing.missing))),
+            (("Undo", "undo", True), ("Remove", "remove", editing.current in editing.placed),
+             ("Save", "save", bool(editing.placed))),
+        )  # fmt: skip
+        draw_buttons(session, PHOTOS, editing, rows)
+        heading(f"{len(editing.placed)} placed, {len(editing.missing)} missing", exact=True)
+        self.draw_list(editing)
+        if imgui.collapsing_header("Keys", imgui.TreeNodeFlags_.default_open):
+            facts("keys", list(PHOTO_KEYS))
+
+    def row_of(self, editing: PhotoEditing, name: str) -> tuple[str, theme.Colour]:
+        view, point = name.split()
+        is_placed = name in editing.placed
+        text = (
+            f"{'+' if is_placed else '-'} {view} {point}  {feature_points()[point_rows()[point]].description}"
+        )
+        return text, theme.TEXT if is_placed else theme.FAINT
 
 
 class MarkersPanel(EditingPanel[MarkerEditing]):

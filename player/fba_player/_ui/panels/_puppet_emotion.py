@@ -18,7 +18,7 @@ from fba_player.session.performer import Performer
 from fba_player.view._geometry import Box, overlap
 
 MAX_PLANE_HEIGHT = 240.0
-MIN_PLANE_HEIGHT = 130.0
+MIN_PLANE_HEIGHT = 104.0
 """Limits of the plane's height in points; within them it leaves room for what is below it."""
 TWO_COLUMNS_WIDTH = 300.0
 """Width in points from which the sliders stand in two columns."""
@@ -30,6 +30,8 @@ HANDLE_RADIUS = 7.0
 """Radius of the point that the mouse drags, in points."""
 EMOTION_TEXT = 12.0
 """Size of the names of emotions, in points."""
+NAMES_APART = 6.0
+"""Points between two names beside each other."""
 AXIS_TEXT = 11.0
 """Size of the names at the ends of the axes, in points."""
 SIDE_SPACE = 10.0
@@ -160,7 +162,7 @@ def place_labels(
     dots: x and y by name. sizes: width and height of each name. taken: boxes that are to stay free as well.
     Where there is no free place, the one that covers least is taken.
     """
-    clear = EMOTION_RADIUS + 2
+    clear, apart = EMOTION_RADIUS + 2, NAMES_APART
     points = [(x - clear, y - clear, x + clear, y + clear) for x, y in dots.values()]
     used = [*taken, *points]
     placed: dict[str, Box] = {}
@@ -178,7 +180,7 @@ def place_labels(
                 if covers < least - 0.5:
                     best, least = box, covers
         placed[name] = best
-        used.append(best)
+        used.append((best[0] - apart, best[1], best[2] + apart, best[3]))
     return placed
 
 

@@ -10,7 +10,7 @@ from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, faps
 from fba_player._ui import theme
 from fba_player._ui.panels.panel import Panel, choose_by_button, choose_name, heading, tooltip
 from fba_player.scene.scene import Scene
-from fba_player.session._actions import act
+from fba_player.session._actions import FOLLOW_TEXTS, act
 from fba_player.session._keys import key_of
 from fba_player.session._session import Session
 from fba_player.view._camera import DISTANCES, PITCH_LIMIT, PRESETS
@@ -96,8 +96,18 @@ class CameraPanel(Panel):
             viewpoint.camera = replace(camera, distance=min(max(distance, low), DISTANCES[1]))
         if opened:
             viewpoint.camera = replace(camera, field_of_view=min(max(angle, 8.0), 70.0))
-        if any(session.scene.travel(session.transport.time)) or not viewpoint.follow:
-            changed, _ = imgui.checkbox("follow the performance", viewpoint.follow)
-            if changed:
-                act(session, "follow")
+        heading("Moves along")
+        order = list(FOLLOW_TEXTS)
+        now = order.index(viewpoint.follow)
+        chosen = choose_name("follows", list(FOLLOW_TEXTS.values()), now, -86)
+        if chosen != now:
+            act(session, f"follow {order[chosen] or 'itself'}")
+        tooltip("by itself: the head in views of the face, else a figure that walks away", key_of("follow"))
+        turning = session.scene.orbit is not None
+        if imgui.checkbox("turns around the figure", turning)[0]:
+            act(session, "orbit")
+        tooltip("turn slowly around the figure", key_of("orbit"))
+        if imgui.button("Copy the command", (-1, 0)):
+            act(session, "copy_command")
+        tooltip("the command that draws this view", key_of("copy_command"))
         imgui.text_colored(theme.FAINT, "x {:.2f}  y {:.2f}  z {:.2f} m".format(*camera.target))

@@ -22,6 +22,8 @@ RELEASE_WIDTH = 18.0
 """Widths in points of the title of a row, its value, and its release button."""
 MIN_SLIDER = 84.0
 """Least width of a slider in points: titles are cut first."""
+ONE_ROW_WIDTH = 268.0
+"""Least width in points of the row at the top, if there is no take."""
 MIN_TITLE = 70.0
 """Least width of a title in points."""
 
@@ -59,7 +61,10 @@ class PuppetPanel(Panel):
         performer = self.performer(session)
         performer.attach()
         self._takes(session, performer)
-        imgui.separator()
+        if performer.recording is not None or performer.takes.last is not None or self._narrow():
+            imgui.separator()
+        else:
+            imgui.same_line(0, 14)
         _, self.together = imgui.checkbox("both sides", self.together)
         tooltip("left and right move together")
         imgui.same_line(0, 14)
@@ -111,8 +116,6 @@ class PuppetPanel(Panel):
         tooltip("record what is shown, with your changes, as a take")
         last = performer.takes.last
         if last is None:
-            imgui.same_line(0, 12)
-            imgui.text_colored(theme.FAINT, "no take yet")
             return
         imgui.same_line()
         if self._button("Stop###show" if performer.showing else "Show###show"):
@@ -132,6 +135,11 @@ class PuppetPanel(Panel):
         imgui.same_line()
         if self._button("Save") or entered:
             _save(session, performer, self._take_name)
+
+    @staticmethod
+    def _narrow() -> bool:
+        """Return whether the button to record, the tick and the button to release need two rows."""
+        return bool(imgui.get_content_region_avail().x < ONE_ROW_WIDTH)
 
     def _button(self, text: str) -> bool:
         pressed = imgui.button(text)

@@ -529,7 +529,7 @@ export class FBAPlayer extends HTMLElement {
     const seek = /** @type {HTMLInputElement} */ (this._find(".track input"));
     seek.max = String(Math.max(playback.end - playback.start, 1e-3));
     seek.value = String(this.currentTime);
-    const frame = `frame ${this.frame + 1} of ${this.frames}`;
+    const frame = `frame ${this.frame} / ${this.frames - 1}`;
     seek.setAttribute("aria-valuetext", `${clockText(this.currentTime)} of ${clockText(this.duration || 0)}, ${frame}`);
     this._find(".now").textContent = clockText(this.currentTime);
     this._find(".all").textContent = this._performers.length ? `/ ${clockText(this.duration)} · ${frame}` : "";

@@ -17,10 +17,28 @@ from fba.cli.option_fields import group, option, with_options
 from fba.cli.printing import Progress, print_json, seconds_text, table_lines
 from fba.errors import FormatError
 
-ARCHIVE = options.ExistingPath(file_okay=False)
-"""The folder of an archive."""
 FOLDER = click.Path(file_okay=False, path_type=Path)
 """A folder to write into, which need not exist."""
+
+
+class ArchiveType(click.ParamType[Any]):
+    """The folder of an archive: a path, or an address as s3://bucket/archive. exists: as paths must."""
+
+    name = "folder"
+
+    def __init__(self, *, exists: bool) -> None:
+        self._path: click.ParamType[Any] = options.ExistingPath(file_okay=False) if exists else FOLDER
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, str) and "://" in value:
+            from fba.archive import find_location
+
+            return find_location(value)
+        return self._path.convert(value, param, ctx)
+
+
+ARCHIVE = ArchiveType(exists=True)
+NEW_ARCHIVE = ArchiveType(exists=False)
 SHOWN = ("name", "subject", "seconds", "bits_per_second", "blinks", "emotion", "limit_frames", "jump_frames",
          "frozen_frames")  # fmt: skip
 """Columns of an index that a query prints by default."""
@@ -113,8 +131,13 @@ def command() -> None:
 @with_options
 def make_command(
     folders: tuple[Path, ...],
-    target: Path = option(
-        "-o", "--output", metavar="DIR", type=FOLDER, required=True, help="Folder of the archive."
+    target: Any = option(
+        "-o",
+        "--output",
+        metavar="DIR",
+        type=NEW_ARCHIVE,
+        required=True,
+        help="Folder of the archive, or its address, as s3://bucket/archive.",
     ),
     coding: _Coding = group(),
     labels: _Labels = group(),
@@ -190,7 +213,7 @@ def print_failures(failed: Iterable[tuple[str, str]]) -> None:
 @command.command("info", epilog=examples("fba archive info archive/"))
 @click.argument("folder", metavar="DIR", type=ARCHIVE)
 @with_options
-def info_command(folder: Path, as_json: bool = options.json_option) -> None:
+def info_command(folder: Any, as_json: bool = options.json_option) -> None:
     """Show what an archive holds: performances, hours, subjects, labels, bytes."""
     from fba.archive import Archive, describe_archive
 
@@ -220,7 +243,7 @@ def info_command(folder: Path, as_json: bool = options.json_option) -> None:
 @click.argument("names", metavar="[NAME...]", nargs=-1)
 @with_options
 def extract_command(
-    folder: Path,
+    folder: Any,
     names: tuple[str, ...],
     target: Path = option(
         "-o", "--output", metavar="FOLDER", type=FOLDER, required=True, help="Folder for the files."
@@ -241,7 +264,7 @@ def extract_command(
 @command.command("verify", epilog=examples("fba archive verify archive/"))
 @click.argument("folder", metavar="DIR", type=ARCHIVE)
 @with_options
-def verify_command(folder: Path, jobs: int | None = jobs_option, as_json: bool = options.json_option) -> None:
+def verify_command(folder: Any, jobs: int | None = jobs_option, as_json: bool = options.json_option) -> None:
     """Check an archive: decode every stream, compare it with its digest and its row, begin at every I plane.
 
     Exits with 1 if anything is damaged.
@@ -266,7 +289,7 @@ def verify_command(folder: Path, jobs: int | None = jobs_option, as_json: bool =
 @command.command("index", epilog=examples("fba archive index archive/"))
 @click.argument("folder", metavar="DIR", type=ARCHIVE)
 @with_options
-def index_command(folder: Path, jobs: int | None = jobs_option) -> None:
+def index_command(folder: Any, jobs: int | None = jobs_option) -> None:
     """Describe every performance in index.parquet, so that `fba archive query` finds it.
 
     It has what moves and how much, bits of each group of parameters, doubtful frames (beyond limits, jumps,
@@ -297,7 +320,7 @@ def index_command(folder: Path, jobs: int | None = jobs_option) -> None:
 @click.argument("condition", metavar="[CONDITION]", default="true")
 @with_options
 def query_command(
-    folder: Path,
+    folder: Any,
     condition: str,
     columns: str | None = option(metavar="NAME,NAME", help="Columns to show; all: every column."),
     sort: str | None = option(metavar="NAME", help="Sort by this column; -NAME: the largest first."),

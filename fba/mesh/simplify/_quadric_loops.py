@@ -1,12 +1,12 @@
-"""Compiled loops of `fba_player._mesh.simplify`: edges are collapsed where that changes the surface least.
+"""Compiled loops of `fba.mesh.simplify`: edges are collapsed where that changes the surface least.
 
 Garland and Heckbert's quadrics, "Simplifying Surfaces with Color and Texture using Quadric Error Metrics"
 (1998), for points of any dimension. One end of each collapsed edge stays where it is, so the vertices that
 remain are some of the original ones.
 
-Bounds: `simplify` checks that corners are vertices, of which there are V points, and makes every array for V
-vertices and 3 F corners. `Fans` list the triangles as they are; those that collapse name goals, which are
-corners of others. Poses have three coordinates each in points.
+Bounds: `simplify_by_quadrics` checks that corners are vertices, of which there are V points, and makes every
+array for V vertices and 3 F corners. `Fans` list the triangles as they are; those that collapse name goals,
+which are corners of others. Poses have three coordinates each in points.
 """
 
 from __future__ import annotations

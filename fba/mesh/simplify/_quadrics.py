@@ -20,7 +20,7 @@ MAX_PASSES = 40
 MIN_REMOVED_SHARE = 0.004
 """A pass that removes less than this share of the vertices is the last one of its level."""
 CACHE_VERSION = "2"
-"""Cache version; increment when `simplify` gives other results."""
+"""Cache version; increment when `simplify_by_quadrics` gives other results."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +51,10 @@ class DetailLevels:
 
     @cached_property
     def _collapses(self) -> tuple[Int32, Int32]:
-        """What `simplify` returns."""
+        """What `simplify_by_quadrics` returns."""
 
         def make() -> list[Int32]:
-            return list(simplify(self.points.astype(np.float64), self.poses, self.triangles))
+            return list(simplify_by_quadrics(self.points.astype(np.float64), self.poses, self.triangles))
 
         count = len(self.points)
         key = make_key("coarse", CACHE_VERSION, self.points, self.triangles)
@@ -64,7 +64,7 @@ class DetailLevels:
         return onto, first
 
 
-def simplify(
+def simplify_by_quadrics(
     points: Float64, poses: int, triangles: Int32, tolerances: Sequence[float] = TOLERANCES
 ) -> tuple[Int32, Int32]:
     """Return the vertex that each vertex collapses onto, and the level at which it does: int32 (V,) twice.
@@ -73,7 +73,7 @@ def simplify(
     triangles: as in `DetailLevels`. Borders keep their course; vertices that share a position stay.
     ValueError for triangles that name other vertices, and for more poses than the points hold.
     """
-    from fba_player._mesh import _simplify_loops as loops
+    from fba.mesh.simplify import _quadric_loops as loops
 
     count, size = points.shape
     left = np.ascontiguousarray(triangles, dtype=np.int32).copy()

@@ -10,8 +10,8 @@ import pytest
 
 from fba.cache import load_or_make
 from fba.compiled import is_compiled
+from fba.mesh.simplify import TOLERANCES, DetailLevels, simplify_by_quadrics
 from fba_player._mesh.primitives import sphere_mesh
-from fba_player._mesh.simplify import TOLERANCES, DetailLevels, simplify
 from fba_player.gl._lod import Details, distance, share_memory
 from fba_player.view._view import FaceMesh, FaceShape
 
@@ -103,8 +103,8 @@ def test_what_moves_in_a_pose_keeps_its_vertices() -> None:
     vertices, triangles = grid(25, 0.1)
     bulged = vertices.copy()
     bulged[:, 2] = 0.01 * np.sin(vertices[:, 0] * 60) * np.sin(vertices[:, 1] * 60)
-    flat = simplify(np.concatenate([vertices, vertices], axis=1), 2, triangles, (0.0004,))[1]
-    moving = simplify(np.concatenate([vertices, bulged], axis=1), 2, triangles, (0.0004,))[1]
+    flat = simplify_by_quadrics(np.concatenate([vertices, vertices], axis=1), 2, triangles, (0.0004,))[1]
+    moving = simplify_by_quadrics(np.concatenate([vertices, bulged], axis=1), 2, triangles, (0.0004,))[1]
     assert (moving == 1).sum() > 2 * (flat == 1).sum()
 
 
@@ -114,7 +114,7 @@ def test_a_seam_does_not_gape() -> None:
     right = left + np.array([0.05, 0.0, 0.0])
     vertices = np.concatenate([left, right])
     both = np.concatenate([triangles, triangles + len(left)]).astype(np.int32)
-    onto, _ = simplify(vertices, 1, both, (0.001,))
+    onto, _ = simplify_by_quadrics(vertices, 1, both, (0.001,))
     seam = np.flatnonzero(np.abs(vertices[:, 0] - 0.05) < 1e-9)
     assert (onto[seam] == seam).all()
 
@@ -174,4 +174,4 @@ def test_meshes_that_do_not_agree_are_refused(poses: int, vertex: int, message: 
     points = np.random.default_rng(0).random((8, 3))
     triangles = np.array([[0, 1, 2], [2, 3, vertex]], dtype=np.int32)
     with pytest.raises(ValueError, match=message):
-        simplify(points, poses, triangles)
+        simplify_by_quadrics(points, poses, triangles)

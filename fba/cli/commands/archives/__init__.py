@@ -1,0 +1,1 @@
+"""Subcommands over many performances: archive, find."""

@@ -1,0 +1,285 @@
+"""Simplification by memoryless edge collapses over several poses, with its history.
+
+Lindstrom and Turk, "Fast and Memory Efficient Polygonal Simplification" (1998): each collapse preserves the
+volume and changes the surface least since the last one; no quadrics are kept. Here the cost is that of the
+mesh in all its poses, so that what moves keeps its vertices. Borders and seams keep their course.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fba.arrays import Bool, Float64, Floating, Int32, Integer
+from fba.errors import ModelError
+
+WELD = 1e-7
+"""Vertices within this share of the mesh's size are one vertex, if they are in every pose."""
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A mesh of fewer triangles, and where its vertices come from.
+
+    positions: float64 (M, 3), at rest. triangles: int32 (F, 3). parents: int32 (N,), the vertex of this level
+    that stands for each vertex of the full mesh. points: int32 (M,), equal for vertices along a seam that are
+    one. rows, weights: int32 and float64 (M, 3), vertices of the full mesh that each is interpolated from.
+    """
+
+    positions: Float64
+    triangles: Int32
+    parents: Int32
+    points: Int32
+    rows: Int32
+    weights: Float64
+
+    def carry(self, values: Floating) -> Float64:
+        """Return values (M, ...) at this level's vertices of those (N, ...) at the full mesh's."""
+        weights = self.weights.reshape(self.weights.shape + (1,) * (values.ndim - 1))
+        return np.asarray((weights * values[self.rows]).sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Simplification:
+    """A mesh and the collapses that simplify it: every level between the full mesh and the last one.
+
+    positions: float64 (N, 3), at rest. triangles: int32 (F, 3). faces: int32 (C,), the number of triangles
+    left by each collapse. The others are those of the collapses: see `_memoryless_loops.History`.
+    """
+
+    positions: Float64
+    triangles: Int32
+    faces: Int32
+    _points: Int32
+    _wedges: Int32
+    _kept: Int32
+    _place: Float64
+    _forest: tuple[Int32, Int32]
+    _wedge_forest: tuple[Int32, Int32]
+
+    def level(self, faces: int) -> Level:
+        """Return the finest level with at most this number of triangles; the last one where none is so small.
+
+        Within the history, nothing is computed again: levels may be had in any order.
+        """
+        return self.after(int(np.searchsorted(-self.faces, -faces)) + 1 if faces < len(self._full) else 0)
+
+    def after(self, collapses: int) -> Level:
+        """Return the mesh after this number of collapses."""
+        count = min(max(collapses, 0), len(self.faces))
+        place = np.empty((int(self._points.max(initial=-1)) + 1, 3))
+        place[self._points] = self.positions
+        place[self._kept[:count]] = self._place[:count]  # the last one of each stays
+        root = _roots(*self._forest, count)[self._points]
+        wedge = _roots(*self._wedge_forest, count)[self._wedges]
+        corners = root[self._full]
+        a, b, c = corners.T
+        left = wedge[self._full[(a != b) & (b != c) & (c != a)]]
+        used, corner = np.unique(left, return_inverse=True)
+        home = np.zeros(len(self._wedge_forest[0]), dtype=np.int32)  # the vertex that each wedge is at
+        home[wedge] = root
+        points: Int32 = home[used]
+        number = np.full(len(home), -1, dtype=np.int32)
+        number[used] = np.arange(len(used))
+        # a side of a seam that has no triangle left: any other vertex at its place stands for it
+        beside = np.zeros(len(place), dtype=np.int32)
+        beside[points] = number[used]
+        parents = np.where(number[wedge] >= 0, number[wedge], beside[root]).astype(np.int32)
+        positions = place[points]
+        triangles = np.ascontiguousarray(corner.reshape(-1, 3), dtype=np.int32)
+        rows, weights = self._sources(positions, parents)
+        return Level(positions, triangles, parents, points, rows, weights)
+
+    @cached_property
+    def _full(self) -> Int32:
+        """The full mesh's triangles with three different corners."""
+        a, b, c = self._points[self.triangles].T
+        return np.ascontiguousarray(self.triangles[(a != b) & (b != c) & (c != a)])
+
+    def _sources(self, positions: Float64, parents: Int32) -> tuple[Int32, Float64]:
+        """Return rows and weights of the nearest points on the triangles that vertices stand for."""
+        full = self._full
+        own = np.arange(len(positions), dtype=np.int32)
+        return _nearest(positions, self.positions[full], parents[full], own, full)
+
+
+def simplify(
+    poses: Floating,
+    triangles: Integer,
+    faces: int | Sequence[int],
+    *,
+    pinned: Bool | None = None,
+    looks: Floating | None = None,
+    importance: Floating | None = None,
+) -> Simplification:
+    """Return the simplification of a mesh down to a number of triangles, or through several, falling.
+
+    poses: (K, N, 3), the vertices in K poses, the first at rest. triangles: (F, 3). pinned: (N,), vertices
+    that stay where they are. looks: (N, A), texture coordinates and colours: vertices of one position and
+    different looks are a seam, which stays closed; without, or with equal ones, they are one vertex.
+    importance: (N,), factors of the cost around each vertex, 1 by default.
+
+    An edge's cost is the source's (half the squared volumes that the collapse sweeps, half the squared areas
+    along borders and seams times the squared length of the edge), summed over the poses, over the area around
+    the edge. Feature points and other pinned vertices stay, borders and seams collapse along themselves only,
+    onto one of their own vertices; all others move to where the volume at rest stays the same.
+
+    Edges of more than two triangles stay. Where nothing can be collapsed, more triangles than asked for are
+    left. ModelError for shapes that do not agree, numbers not finite and triangles that name other vertices.
+    """
+    from fba.mesh.simplify import _memoryless_loops as loops
+
+    places, corners = _check(poses, triangles)
+    count = places.shape[1]
+    size = max(float(np.ptp(places[0], axis=0).max(initial=0.0)), 1e-30)
+    flat = np.ascontiguousarray(places.transpose(1, 0, 2).reshape(count, -1))
+    points = _number_rows(np.round(flat / (size * WELD)))
+    given = np.zeros((count, 0)) if looks is None else np.asarray(looks, dtype=np.float64)
+    if given.ndim != 2 or len(given) != count:
+        raise ModelError(f"looks must have {count} rows, one for each vertex, not the shape {given.shape}")
+    wedges = _number_rows(np.concatenate([points[:, None], given], axis=1))
+    total = int(points.max(initial=-1)) + 1
+    whole = points[corners]
+    proper = (whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])
+    whole, sides = np.ascontiguousarray(whole[proper]), np.ascontiguousarray(wedges[corners[proper]])
+    kind = _kinds(whole, sides, total)
+    if pinned is not None:
+        kind[points[_per_vertex(pinned, count, "pinned") > 0]] = loops.PINNED
+    welded = np.empty((total, len(places), 3))
+    welded[points] = places.transpose(1, 0, 2)
+    weight = np.ones(total)
+    if importance is not None:
+        weight[points] = _per_vertex(importance, count, "importance")
+    surface = loops.Surface(
+        welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
+        kind, np.zeros(total, np.int64), weight,
+    )  # fmt: skip
+    number = int(wedges.max(initial=-1)) + 1
+    history = loops.History(
+        np.zeros(total, np.int32), np.zeros((total, 3)), np.zeros(total, np.int32),
+        np.arange(total, dtype=np.int32), np.full(total, total, np.int32),
+        np.arange(number, dtype=np.int32), np.full(number, total, np.int32),
+    )  # fmt: skip
+    scratch = loops.Scratch(
+        np.empty(2 * loops.MAX_RING, np.int32), np.empty(4 * loops.MAX_RING + 4, np.int32),
+        np.empty((len(places), 13)), np.empty((3, 4)), np.empty(3), np.empty(1),
+    )  # fmt: skip
+    done = 0
+    if total:
+        loops.link_corners(surface)
+        for target in [faces] if isinstance(faces, int) else faces:
+            left = int(history.faces[done - 1]) if done else len(whole)
+            done = loops.collapse_edges(surface, history, done, left, max(int(target), 1), scratch)
+    return Simplification(
+        places[0], corners, history.faces[:done].copy(), points, wedges, history.kept[:done].copy(),
+        history.place[:done].copy(), (history.onto, history.step), (history.wedge_onto, history.wedge_step),
+    )  # fmt: skip
+
+
+def place_on_level(positions: Floating, level: Level) -> tuple[Int32, Float64]:
+    """Return where each vertex (N, 3) of the full mesh lies on a level: int32 (N, 3), vertices of the level,
+    and float64 (N, 3), their weights. Only triangles around the vertex that stands for it count."""
+    return place_on_triangles(positions, level.positions, level.triangles, level.parents)
+
+
+def place_on_triangles(
+    positions: Floating, vertices: Floating, triangles: Int32, parents: Integer
+) -> tuple[Int32, Float64]:
+    """Return the nearest point to each of positions (N, 3) on the triangles around one vertex.
+
+    vertices: (M, 3). triangles: (F, 3). parents: (N,), the vertex whose triangles count. The results are
+    int32 (N, 3), the triangle's corners, and float64 (N, 3), their weights.
+    """
+    return _nearest(positions, np.asarray(vertices)[triangles], triangles, parents, triangles)
+
+
+def _nearest(
+    positions: Floating, corners: Floating, owners: Int32, own: Integer, names: Int32
+) -> tuple[Int32, Float64]:
+    """Return the nearest point to each of positions (N, 3) on triangles (F, 3, 3): names (N, 3) and weights.
+
+    owners: (F, 3), which lists each triangle is in, once for each corner. own: (N,), the list of each
+    position. names: (F, 3), what the corners are called. ModelError where there is no triangle.
+    """
+    from fba.mesh.simplify import _nearest_loops as loops
+
+    flat = owners.ravel()
+    count = max(int(flat.max(initial=-1)), int(own.max(initial=-1))) + 1
+    if not len(corners) or min(int(flat.min()), int(own.min(initial=0))) < 0:
+        raise ModelError("no triangle is left around a vertex of the mesh")
+    start = np.zeros(count + 1, dtype=np.int64)
+    np.cumsum(np.bincount(flat, minlength=count), out=start[1:])
+    lists = (np.argsort(flat, kind="stable") // 3).astype(np.int32)
+    triangle, weights = np.zeros(len(positions), dtype=np.int32), np.zeros((len(positions), 3))
+    weights[:, 0] = 1.0  # of the first triangle, for what has none
+    loops.nearest(
+        np.ascontiguousarray(positions, dtype=np.float64), np.ascontiguousarray(corners, dtype=np.float64),
+        start, lists, np.ascontiguousarray(own, dtype=np.int32), triangle, weights,
+    )  # fmt: skip
+    return names[triangle], weights
+
+
+def _per_vertex(values: Floating | Bool, count: int, what: str) -> Float64:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != (count,) or not np.isfinite(array).all() or (array < 0).any():
+        raise ModelError(f"{what} must be {count} numbers that are not negative, one for each vertex")
+    return array
+
+
+def _check(poses: Floating, triangles: Integer) -> tuple[Float64, Int32]:
+    places, corners = np.array(poses, dtype=np.float64), np.asarray(triangles)
+    if places.ndim != 3 or places.shape[2] != 3 or not len(places):
+        raise ModelError(f"poses must have shape (K, N, 3), at least one, not {places.shape}")
+    if not np.isfinite(places).all():
+        raise ModelError("a vertex has a position that is not finite")
+    if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
+        raise ModelError(f"triangles must be whole numbers, (F, 3), not {corners.dtype} {corners.shape}")
+    if corners.size and not 0 <= corners.min() <= corners.max() < places.shape[1]:
+        raise ModelError(f"triangles name vertices beyond the {places.shape[1]} that exist")
+    return places, np.ascontiguousarray(corners, dtype=np.int32)
+
+
+def _number_rows(rows: Float64) -> Int32:
+    """Return (N,): equal numbers for equal rows (N, A), rising with the first row of each."""
+    packed = np.ascontiguousarray(rows + 0.0)  # no negative zeros
+    view = packed.view(np.dtype((np.void, packed.dtype.itemsize * packed.shape[1]))).ravel()
+    _, first, number = np.unique(view, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int32)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[number]
+
+
+def _kinds(triangles: Int32, wedges: Int32, count: int) -> Int32:
+    """Return int32 (V,): which vertices may move, by the borders and seams that they lie on."""
+    from fba.mesh.simplify import _memoryless_loops as loops
+
+    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    sides = wedges[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    turned = ends[:, 0] > ends[:, 1]
+    ends[turned], sides[turned] = ends[turned, ::-1], sides[turned, ::-1]
+    _, edge, times = np.unique(ends[:, 0] * count + ends[:, 1], return_inverse=True, return_counts=True)
+    order = np.argsort(edge, kind="stable")
+    first = np.cumsum(times) - times
+    one, other = order[first], order[first + times - 1]
+    line = (times == 1) | (sides[one] != sides[other]).any(axis=1)
+    lines = np.bincount(ends[one[line]].ravel(), minlength=count)
+    crowded = np.bincount(ends[one[times > 2]].ravel(), minlength=count) > 0
+    pairs = np.unique(np.stack([triangles.ravel(), wedges.ravel()], axis=1), axis=0)
+    parts = np.bincount(pairs[:, 0], minlength=count)
+    kind = np.full(count, loops.FREE, dtype=np.int32)
+    kind[lines > 0] = loops.ON_LINE
+    kind[(lines == 1) | (lines > 2) | crowded | (parts > 2) | ((lines == 0) & (parts > 1))] = loops.PINNED
+    return kind
+
+
+def _roots(onto: Int32, step: Int32, count: int) -> Int32:
+    """Return what each vertex has become after the first `count` collapses."""
+    root = np.where(step < count, onto, np.arange(len(onto), dtype=np.int32))
+    while True:  # each round halves the way to the root
+        following = root[root]
+        if np.array_equal(following, root):
+            return root
+        root = following

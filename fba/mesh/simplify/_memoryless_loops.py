@@ -1,0 +1,641 @@
+"""Compiled loops of `fba.mesh.simplify`: memoryless edge collapses that see a mesh in several poses.
+
+Lindstrom and Turk, "Fast and Memory Efficient Polygonal Simplification" (1998), with the cost summed over
+poses: each pose has the mesh's triangles at other positions. A vertex that comes to lie at rest at x lies in
+each other pose at x plus the motion interpolated along the collapsed edge, as tables of shifts would move it.
+
+Bounds: `_memoryless.py` makes every array for V vertices, W wedges and F triangles that it has checked; lists
+of corners name corners of these triangles. No vertex with more than `MAX_RING` triangles is collapsed, and
+scratch arrays have room for two such rings.
+"""
+
+from __future__ import annotations
+
+from heapq import heappop, heappush
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fba.arrays import Float64, Int32, Int64
+from fba.compiled import compiled, inlined
+
+MAX_RING = 64
+"""A vertex with more triangles than this takes no part in collapses."""
+SURFACE_SHARE = 0.5
+"""Lambda: the share of the surface's change in the cost; the rest is that of borders."""
+SINE = float(np.sin(np.radians(1.0)))
+COSINE = float(np.cos(np.radians(1.0)))
+"""Of alpha, the least angle between a plane and those that determine a position already."""
+MIN_TURN_COSINE = 0.2
+"""No triangle may turn by more than the angle of this cosine, in any pose."""
+FREE, ON_LINE, PINNED = 0, 1, 2
+"""Vertices that may move; those on a border or seam, which only collapse along it; those that stay."""
+
+
+class Surface(NamedTuple):
+    """A mesh while it is simplified.
+
+    places: float64 (V, K, 3), vertices in all poses, at rest first. triangles, wedges: int32 (F, 3), vertices
+    and wedges of each corner; the first corner is -1 once the triangle is gone. first, follow: (V,) and
+    (3 F,), the corners of each vertex as a linked list. kind: (V,). version: (V,), counts changes nearby.
+    """
+
+    places: Float64
+    triangles: Int32
+    wedges: Int32
+    first: Int32
+    follow: Int32
+    kind: Int32
+    version: Int64
+    importance: Float64
+
+
+class History(NamedTuple):
+    """Collapses in order, written for at most V.
+
+    kept: (V,), the vertex that stays; place: (V, 3), where to; faces: (V,), triangles left. onto, step,
+    wedge_onto, wedge_step: (V,) twice and (W,) twice, what each vertex or wedge joins, and in which collapse.
+    """
+
+    kept: Int32
+    place: Float64
+    faces: Int32
+    onto: Int32
+    step: Int32
+    wedge_onto: Int32
+    wedge_step: Int32
+
+
+class Scratch(NamedTuple):
+    """ring, near: int32, triangles and vertices around an edge. sums: (K, 13), of each pose: the quadratic as
+    A (6), b (3), c, and the motion of one end relative to the other (3). planes: (3, 4), normals and right
+    sides. place: (3,), relative to one end. squared: (1,), the sum of the squared normals of the ring."""
+
+    ring: Int32
+    near: Int32
+    sums: Float64
+    planes: Float64
+    place: Float64
+    squared: Float64
+
+
+@compiled
+def link_corners(surface: Surface) -> None:
+    """Write the lists of corners."""
+    for c in range(3 * len(surface.triangles) - 1, -1, -1):
+        v = surface.triangles[c // 3, c % 3]
+        surface.follow[c] = surface.first[v]
+        surface.first[v] = c
+
+
+@inlined
+def _corner_of(triangle: Int32, v: int) -> int:
+    """Return which corner of a triangle is v, -1 for none."""
+    return 0 if triangle[0] == v else (1 if triangle[1] == v else (2 if triangle[2] == v else -1))
+
+
+@compiled
+def _find_ring(surface: Surface, a: int, b: int, ring: Int32) -> int:
+    """Write the triangles around a or b; return their number, or -1 where one has more than `MAX_RING`."""
+    count = 0
+    for v in (a, b):
+        own = 0
+        c = surface.first[v]
+        while c >= 0:
+            t = c // 3
+            triangle = surface.triangles[t]
+            if triangle[0] >= 0:
+                own += 1
+                if own > MAX_RING:
+                    return -1
+                if v == a or _corner_of(triangle, a) < 0:
+                    ring[count] = t
+                    count += 1
+            c = surface.follow[c]
+    return count
+
+
+@compiled
+def _is_line(surface: Surface, a: int, b: int) -> bool:
+    """Return whether the edge from a to b belongs to a border, or to a seam whose sides both go on."""
+    triangles, wedges = surface.triangles, surface.wedges
+    count, one, two, other_one, other_two = 0, -1, -1, -1, -1
+    c = surface.first[a]
+    while c >= 0:
+        t = c // 3
+        k = _corner_of(triangles[t], b)
+        if triangles[t, 0] >= 0 and k >= 0:
+            if count == 0:
+                one, two = wedges[t, c % 3], wedges[t, k]
+            else:
+                other_one, other_two = wedges[t, c % 3], wedges[t, k]
+            count += 1
+        c = surface.follow[c]
+    return count == 1 or (count == 2 and one != other_one and two != other_two)
+
+
+@compiled
+def _add_quadratic(sums: Float64, k: int, x: float, y: float, z: float, d: float, weight: float) -> None:
+    """Add weight * ((x, y, z) . p - d)**2 to a quadratic."""
+    sums[k, 0] += weight * x * x
+    sums[k, 1] += weight * x * y
+    sums[k, 2] += weight * x * z
+    sums[k, 3] += weight * y * y
+    sums[k, 4] += weight * y * z
+    sums[k, 5] += weight * z * z
+    sums[k, 6] += weight * d * x
+    sums[k, 7] += weight * d * y
+    sums[k, 8] += weight * d * z
+    sums[k, 9] += weight * d * d
+
+
+@compiled
+def _add_line(surface: Surface, a: int, v: int, w: int, weight: float, sums: Float64) -> None:
+    """Add the squared area between a border's edge from v to w and a position, in each pose."""
+    places = surface.places
+    for k in range(places.shape[1]):
+        ux, uy, uz = (
+            places[w, k, 0] - places[v, k, 0],
+            places[w, k, 1] - places[v, k, 1],
+            places[w, k, 2] - places[v, k, 2],
+        )
+        vx, vy, vz = (
+            places[v, k, 0] - places[a, k, 0],
+            places[v, k, 1] - places[a, k, 1],
+            places[v, k, 2] - places[a, k, 2],
+        )
+        # p x u = v x u, one component after the other
+        _add_quadratic(sums, k, 0.0, uz, -uy, vy * uz - vz * uy, weight)
+        _add_quadratic(sums, k, -uz, 0.0, ux, vz * ux - vx * uz, weight)
+        _add_quadratic(sums, k, uy, -ux, 0.0, vx * uy - vy * ux, weight)
+
+
+@compiled
+def _sum_changes(surface: Surface, a: int, b: int, count: int, scratch: Scratch) -> float:
+    """Write the quadratics of an edge's cost, of positions relative to a, and the normal of the plane of
+    equal volume, planes[0, :3]; return that plane's right side."""
+    places, triangles = surface.places, surface.triangles
+    sums, planes = scratch.sums, scratch.planes
+    sums[:] = 0.0
+    planes[:] = 0.0
+    volume = 0.0
+    scratch.squared[0] = 0.0
+    for k in range(places.shape[1]):
+        ox, oy, oz = places[a, k, 0], places[a, k, 1], places[a, k, 2]
+        for i in range(count):
+            p, q, r = triangles[scratch.ring[i]]
+            px, py, pz = places[p, k, 0] - ox, places[p, k, 1] - oy, places[p, k, 2] - oz
+            ex, ey, ez = places[q, k, 0] - ox - px, places[q, k, 1] - oy - py, places[q, k, 2] - oz - pz
+            fx, fy, fz = places[r, k, 0] - ox - px, places[r, k, 1] - oy - py, places[r, k, 2] - oz - pz
+            x, y, z = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
+            d = x * px + y * py + z * pz
+            _add_quadratic(sums, k, x, y, z, d, SURFACE_SHARE / 36)
+            if k == 0:
+                planes[0, 0] += x
+                planes[0, 1] += y
+                planes[0, 2] += z
+                volume += d
+                scratch.squared[0] += x * x + y * y + z * z
+        for i in range(3):
+            sums[k, 10 + i] = (places[b, k, i] - places[b, 0, i]) - (places[a, k, i] - places[a, 0, i])
+    return volume
+
+
+@compiled
+def _add_lines(surface: Surface, a: int, b: int, count: int, weight: float, scratch: Scratch) -> None:
+    """Add the changes of borders and seams around an edge to its cost."""
+    for i in range(count):
+        t = scratch.ring[i]
+        for k in range(3):
+            v, w = surface.triangles[t, k], surface.triangles[t, (k + 1) % 3]
+            touches = v in (a, b) or w in (a, b)
+            if touches and surface.kind[v] != FREE and surface.kind[w] != FREE and _is_line(surface, v, w):
+                _add_line(surface, a, v, w, weight, scratch.sums)
+
+
+@compiled
+def _add_plane(planes: Float64, count: int, x: float, y: float, z: float, d: float) -> int:
+    """Add the plane (x, y, z) . p = d to those that determine a position, unless it is nearly parallel to
+    them; return their number."""
+    squared = x * x + y * y + z * z
+    if count == 0:
+        fits = squared > 0.0
+    elif count == 1:
+        along = planes[0, 0] * x + planes[0, 1] * y + planes[0, 2] * z
+        first = planes[0, 0] ** 2 + planes[0, 1] ** 2 + planes[0, 2] ** 2
+        fits = along * along < first * squared * COSINE * COSINE
+    else:
+        cx, cy, cz = _cross(planes)
+        triple = cx * x + cy * y + cz * z
+        fits = triple * triple > (cx * cx + cy * cy + cz * cz) * squared * SINE * SINE
+    if not fits:
+        return count
+    planes[count, 0], planes[count, 1], planes[count, 2], planes[count, 3] = x, y, z, d
+    return count + 1
+
+
+@compiled
+def _cross(planes: Float64) -> tuple[float, float, float]:
+    """Return the cross product of the normals of the first two planes."""
+    return (
+        planes[0, 1] * planes[1, 2] - planes[0, 2] * planes[1, 1],
+        planes[0, 2] * planes[1, 0] - planes[0, 0] * planes[1, 2],
+        planes[0, 0] * planes[1, 1] - planes[0, 1] * planes[1, 0],
+    )
+
+
+@compiled
+def _add_minimum(planes: Float64, count: int, a: Float64, b: Float64) -> int:
+    """Add planes through the constrained minimum of p.A.p / 2 - b.p, A (6,), b (3,); return their number."""
+    rows = np.zeros((3, 3))
+    wanted = 3 - count
+    if count == 0:
+        rows[0, 0] = rows[1, 1] = rows[2, 2] = 1.0
+    elif count == 1:
+        n = planes[0]
+        least = 0
+        for i in range(1, 3):
+            if abs(n[i]) < abs(n[least]):
+                least = i
+        i, j = (least + 1) % 3, (least + 2) % 3
+        rows[0, i], rows[0, j] = -n[j], n[i]
+        rows[1, 0] = n[1] * rows[0, 2] - n[2] * rows[0, 1]
+        rows[1, 1] = n[2] * rows[0, 0] - n[0] * rows[0, 2]
+        rows[1, 2] = n[0] * rows[0, 1] - n[1] * rows[0, 0]
+    elif count == 2:
+        rows[0, 0], rows[0, 1], rows[0, 2] = _cross(planes)
+    for i in range(wanted):
+        x, y, z = rows[i]
+        count = _add_plane(
+            planes,
+            count,
+            x * a[0] + y * a[1] + z * a[2],
+            x * a[1] + y * a[3] + z * a[4],
+            x * a[2] + y * a[4] + z * a[5],
+            x * b[0] + y * b[1] + z * b[2],
+        )
+    return count
+
+
+@compiled
+def _intersect(planes: Float64, place: Float64) -> bool:
+    """Write the intersection of three planes; return whether it is finite."""
+    cx, cy, cz = _cross(planes)
+    whole = cx * planes[2, 0] + cy * planes[2, 1] + cz * planes[2, 2]
+    if whole == 0.0:
+        return False
+    a, b = planes[0], planes[1]
+    c = planes[2]
+    fine = True
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        place[i] = (
+            a[3] * (b[j] * c[k] - b[k] * c[j])
+            + b[3] * (c[j] * a[k] - c[k] * a[j])
+            + c[3] * (a[j] * b[k] - a[k] * b[j])
+        ) / whole
+        fine = fine and np.isfinite(place[i])
+    return fine
+
+
+@compiled
+def _cost_at(sums: Float64, place: Float64, t: float) -> float:
+    """Return the cost of a position relative to one end, with the motion at t along the edge."""
+    cost = 0.0
+    for k in range(len(sums)):
+        s = sums[k]
+        x, y, z = place[0] + t * s[10], place[1] + t * s[11], place[2] + t * s[12]
+        cost += s[0] * x * x + s[3] * y * y + s[5] * z * z + 2 * (s[1] * x * y + s[2] * x * z + s[4] * y * z)
+        cost += s[9] - 2 * (s[6] * x + s[7] * y + s[8] * z)
+    return max(cost, 0.0)
+
+
+@compiled
+def _find_place(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[float, float]:
+    """Write where the edge from a to b is best collapsed to, relative to a; return the cost and where that
+    is along the edge, 0 for a and 1 for b. The cost is -1 for an edge that must stay."""
+    places, kind = surface.places, surface.kind
+    if kind[a] == PINNED and kind[b] == PINNED:
+        return -1.0, 0.0
+    if kind[a] != FREE and kind[b] != FREE and not _is_line(surface, a, b):
+        return -1.0, 0.0
+    count = _find_ring(surface, a, b, scratch.ring)
+    if count < 0:
+        return -1.0, 0.0
+    edge = np.empty(3)
+    squared = 0.0
+    for i in range(3):
+        edge[i] = places[b, 0, i] - places[a, 0, i]
+        squared += edge[i] * edge[i]
+    volume = _sum_changes(surface, a, b, count, scratch)
+    if kind[a] != FREE or kind[b] != FREE:
+        _add_lines(surface, a, b, count, (1 - SURFACE_SHARE) * squared / 4, scratch)
+    sums, planes, place = scratch.sums, scratch.planes, scratch.place
+    if kind[a] != FREE or kind[b] != FREE:  # one end stays
+        place[:] = 0.0
+        at_a = _cost_at(sums, place, 0.0)
+        place[:] = edge
+        at_b = _cost_at(sums, place, 1.0)
+        if kind[a] > kind[b] or (kind[a] == kind[b] and at_a <= at_b):
+            place[:] = 0.0
+            return at_a, 0.0
+        return at_b, 1.0
+    x, y, z = planes[0, 0], planes[0, 1], planes[0, 2]
+    found = _add_plane(planes, 0, x, y, z, volume)
+    hessian, right = np.zeros(6), np.zeros(3)
+    for k in range(len(sums)):
+        s = sums[k]
+        for i in range(6):
+            hessian[i] += s[i]
+        gx, gy, gz = 0.5 * s[10], 0.5 * s[11], 0.5 * s[12]
+        right[0] += s[6] - (s[0] * gx + s[1] * gy + s[2] * gz)
+        right[1] += s[7] - (s[1] * gx + s[3] * gy + s[4] * gz)
+        right[2] += s[8] - (s[2] * gx + s[4] * gy + s[5] * gz)
+    found = _add_minimum(planes, found, hessian, right)
+    if found < 3:
+        _sum_neighbours(surface, a, b, count, scratch.ring, hessian, right)
+        found = _add_minimum(planes, found, hessian, right)
+    if found < 3 or not _intersect(planes, place):
+        return -1.0, 0.0
+    along = place[0] * edge[0] + place[1] * edge[1] + place[2] * edge[2]
+    t = min(max(along / squared, 0.0), 1.0) if squared > 0.0 else 0.5
+    return _cost_at(sums, place, t), t
+
+
+@compiled
+def _priority(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[float, float]:
+    """Return the cost of an edge by which edges are ordered, and where along it the collapse goes.
+
+    That is the cost over the area around the edge, so that a finely modelled region, whose triangles are
+    small, is not the first to go, times the importance of its ends. -1 for an edge that must stay.
+    """
+    cost, along = _find_place(surface, a, b, scratch)
+    if cost > 0.0 and scratch.squared[0] > 0.0:
+        cost *= 0.5 * (surface.importance[a] + surface.importance[b]) / np.sqrt(scratch.squared[0])
+    return cost, along
+
+
+@compiled
+def _sum_neighbours(
+    surface: Surface, a: int, b: int, count: int, ring: Int32, hessian: Float64, right: Float64
+) -> None:
+    """Write the quadratic of the squared distances to the corners around an edge."""
+    hessian[:] = 0.0
+    right[:] = 0.0
+    for i in range(count):
+        for k in range(3):
+            v = surface.triangles[ring[i], k]
+            if v in (a, b):
+                continue
+            hessian[0] += 1.0
+            hessian[3] += 1.0
+            hessian[5] += 1.0
+            for n in range(3):
+                right[n] += surface.places[v, 0, n] - surface.places[a, 0, n]
+
+
+@compiled
+def _add_neighbours(surface: Surface, v: int, near: Int32, count: int) -> int:
+    """Append the neighbours of v that are not listed yet; return the number of all."""
+    c = surface.first[v]
+    while c >= 0:
+        triangle = surface.triangles[c // 3]
+        if triangle[0] >= 0:
+            for k in range(3):
+                w = triangle[k]
+                new = w != v
+                for i in range(count):
+                    new = new and near[i] != w
+                if new:
+                    near[count] = w
+                    count += 1
+        c = surface.follow[c]
+    return count
+
+
+@compiled
+def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
+    """Return whether the mesh stays a manifold of the same topology when the edge from a to b collapses."""
+    near = scratch.near
+    own = _add_neighbours(surface, a, near, 0)
+    both = _add_neighbours(surface, b, near, own)
+    # b is a neighbour of a, and a becomes one of b
+    common = 0
+    c = surface.first[b]
+    seen = np.zeros(own, dtype=np.bool_)
+    while c >= 0:
+        triangle = surface.triangles[c // 3]
+        if triangle[0] >= 0:
+            for k in range(3):
+                for i in range(own):
+                    if near[i] == triangle[k] and triangle[k] != b:
+                        seen[i] = True
+        c = surface.follow[c]
+    for i in range(own):
+        common += seen[i]
+    faces = 0
+    c = surface.first[a]
+    while c >= 0:
+        t = c // 3
+        if surface.triangles[t, 0] >= 0 and _corner_of(surface.triangles[t], b) >= 0:
+            faces += 1
+        c = surface.follow[c]
+    border = _on_border(surface, a) or _on_border(surface, b)
+    if _on_border(surface, a) and _on_border(surface, b) and faces != 1:
+        return False
+    return common == faces and 1 <= faces <= 2 and both > (3 if border else 4)
+
+
+@compiled
+def _on_border(surface: Surface, v: int) -> bool:
+    """Return whether an edge of v belongs to one triangle only: then two corners around it occur once."""
+    if surface.kind[v] == FREE:
+        return False
+    c = surface.first[v]
+    while c >= 0:
+        t = c // 3
+        if surface.triangles[t, 0] >= 0:
+            for k in range(1, 3):
+                w = surface.triangles[t, (c % 3 + k) % 3]
+                count = 0
+                d = surface.first[v]
+                while d >= 0:
+                    if surface.triangles[d // 3, 0] >= 0 and _corner_of(surface.triangles[d // 3], w) >= 0:
+                        count += 1
+                    d = surface.follow[d]
+                if count == 1:
+                    return True
+        c = surface.follow[c]
+    return False
+
+
+@compiled
+def _turns_over(surface: Surface, a: int, b: int, t: float, count: int, scratch: Scratch) -> bool:
+    """Return whether a triangle would turn too far in a pose, or lose its area."""
+    places, place = surface.places, scratch.place
+    for i in range(count):
+        corners = surface.triangles[scratch.ring[i]]
+        at_a, at_b = _corner_of(corners, a), _corner_of(corners, b)
+        if at_a >= 0 and at_b >= 0:
+            continue
+        at = max(at_a, at_b)
+        v, p, q = corners[at], corners[(at + 1) % 3], corners[(at + 2) % 3]
+        for k in range(places.shape[1]):
+            s = scratch.sums[k]
+            ex, ey, ez = (
+                places[q, k, 0] - places[p, k, 0],
+                places[q, k, 1] - places[p, k, 1],
+                places[q, k, 2] - places[p, k, 2],
+            )
+            ux, uy, uz = (
+                places[v, k, 0] - places[p, k, 0],
+                places[v, k, 1] - places[p, k, 1],
+                places[v, k, 2] - places[p, k, 2],
+            )
+            wx = places[a, k, 0] + place[0] + t * s[10] - places[p, k, 0]
+            wy = places[a, k, 1] + place[1] + t * s[11] - places[p, k, 1]
+            wz = places[a, k, 2] + place[2] + t * s[12] - places[p, k, 2]
+            ax, ay, az = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
+            bx, by, bz = ey * wz - ez * wy, ez * wx - ex * wz, ex * wy - ey * wx
+            before, after = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
+            if before > 0.0 and ax * bx + ay * by + az * bz <= MIN_TURN_COSINE * np.sqrt(before * after):
+                return True
+    return False
+
+
+@compiled
+def collapse_edges(
+    surface: Surface, history: History, done: int, faces: int, target: int, scratch: Scratch
+) -> int:
+    """Collapse the cheapest edges first until at most `target` triangles are left or none can go.
+
+    done, faces: collapses in the history so far, and triangles left. Where only one more triangle may go, an
+    edge of a border goes, if there is any. Return the number of collapses in the history.
+    """
+    triangles, version = surface.triangles, surface.version
+    before = -1
+    while faces > target and before != done:
+        before = done
+        heap: list[tuple[float, Any, Any, Any]] = [(0.0, np.int64(0), np.int64(0), np.int64(0))]
+        heap.pop()
+        for t in range(len(triangles)):
+            for k in range(3):
+                a, b = triangles[t, k], triangles[t, (k + 1) % 3]
+                if triangles[t, 0] >= 0 and (a < b or not _has_edge(surface, b, a)):
+                    cost, _ = _priority(surface, a, b, scratch)
+                    if cost >= 0.0:
+                        heappush(heap, (cost, np.int64(a), np.int64(b), version[a] + version[b]))
+        while len(heap) > 0 and faces > target:
+            _, a, b, stamp = heappop(heap)
+            if history.onto[a] != a or history.onto[b] != b:
+                continue
+            cost, along = _priority(surface, a, b, scratch)
+            if cost < 0.0:
+                continue
+            if stamp != version[a] + version[b]:
+                heappush(heap, (cost, a, b, version[a] + version[b]))
+                continue
+            count = _find_ring(surface, a, b, scratch.ring)
+            lost = 0
+            for i in range(count):
+                corners = triangles[scratch.ring[i]]
+                lost += _corner_of(corners, a) >= 0 and _corner_of(corners, b) >= 0
+            if faces - lost < target or _turns_over(surface, a, b, along, count, scratch):
+                continue
+            if not _is_valid(surface, a, b, scratch):
+                continue
+            kind, other = surface.kind[a], surface.kind[b]
+            if other > kind or (other == kind and kind != FREE and along > 0.0):
+                _collapse(surface, history, b, a, along, done, scratch)
+                a = b
+            else:
+                _collapse(surface, history, a, b, along, done, scratch)
+            faces -= lost
+            history.faces[done] = faces
+            done += 1
+            around = _add_neighbours(surface, a, scratch.near, 0)
+            version[a] += 1
+            for i in range(around):
+                version[scratch.near[i]] += 1
+            for i in range(around):
+                near: Any = np.int64(scratch.near[i])
+                cost, _ = _priority(surface, a, near, scratch)
+                if cost >= 0.0:
+                    heappush(heap, (cost, a, near, version[a] + version[near]))
+    return done
+
+
+@compiled
+def _has_edge(surface: Surface, a: int, b: int) -> bool:
+    """Return whether a triangle has an edge from a to b, in this direction."""
+    c = surface.first[a]
+    while c >= 0:
+        t = c // 3
+        if surface.triangles[t, 0] >= 0 and surface.triangles[t, (c % 3 + 1) % 3] == b:
+            return True
+        c = surface.follow[c]
+    return False
+
+
+@compiled
+def _collapse(
+    surface: Surface, history: History, keep: int, gone: int, along: float, step: int, scratch: Scratch
+) -> None:
+    """Collapse `gone` onto `keep` at the evaluated position, and write it to the history.
+
+    The position in scratch is relative to the end that was evaluated as the first: along counts from it.
+    """
+    triangles, wedges, places = surface.triangles, surface.wedges, surface.places
+    moves = surface.kind[keep] == FREE
+    if moves:
+        for k in range(places.shape[1]):
+            for i in range(3):
+                places[keep, k, i] += scratch.place[i] + along * scratch.sums[k, 10 + i]
+    for i in range(3):
+        history.place[step, i] = places[keep, 0, i]
+    history.kept[step] = keep
+    history.onto[gone] = keep
+    history.step[gone] = step
+    last = -1
+    c = surface.first[gone]
+    while c >= 0:  # wedges on the two sides of the edge become one
+        t = c // 3
+        if triangles[t, 0] >= 0:
+            k = _corner_of(triangles[t], keep)
+            if k >= 0:
+                old, new = wedges[t, c % 3], wedges[t, k]
+                if history.wedge_onto[old] == old and old != new:
+                    history.wedge_onto[old] = new
+                    history.wedge_step[old] = step
+        last = c
+        c = surface.follow[c]
+    c = surface.first[gone]
+    while c >= 0:
+        t, k = c // 3, c % 3
+        if triangles[t, 0] >= 0:
+            wedges[t, k] = history.wedge_onto[wedges[t, k]]
+            if _corner_of(triangles[t], keep) >= 0:
+                triangles[t, 0] = -1
+            else:
+                triangles[t, k] = keep
+        c = surface.follow[c]
+    surface.follow[last] = surface.first[keep]
+    surface.first[keep] = surface.first[gone]
+    surface.first[gone] = -1
+    _drop_dead(surface, keep)
+
+
+@compiled
+def _drop_dead(surface: Surface, v: int) -> None:
+    """Take corners of triangles that are gone off the list of v."""
+    last, c = -1, surface.first[v]
+    while c >= 0:
+        following = surface.follow[c]
+        if surface.triangles[c // 3, 0] < 0:
+            if last < 0:
+                surface.first[v] = following
+            else:
+                surface.follow[last] = following
+        else:
+            last = c
+        c = following

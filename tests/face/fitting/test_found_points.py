@@ -1,0 +1,73 @@
+"""Points are found on pictures of the built-in head, and not where there is no face."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from fba import Animation, FaceTrack, player
+from fba.arrays import Float64, UInt8
+from fba.errors import FbaWarning, ModelError
+from fba.face import FaceModel
+from fba.face.fitting import FoundPoints, Photograph, find_front_points, find_side_points
+from fba.parameters import point_rows
+
+SIZE = (300, 360)
+
+
+def rendered(yaw: float, size: tuple[int, int] = SIZE) -> tuple[Photograph, Float64]:
+    """A picture of the built-in head, and where its feature points are on it."""
+    scene = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)))
+    camera = player.Camera(target=(0.0, -0.03, -0.06), yaw=yaw, distance=1.5, field_of_view=13.0)
+    with player.Offscreen(scene, size, samples=2) as view:
+        view.camera = camera
+        pixels: UInt8 = np.ascontiguousarray(view.frame(0.0)[..., :3])
+    points = FaceModel.default().points
+    clip = np.column_stack([points, np.ones(len(points))]) @ camera.clip_matrix(size).T
+    return Photograph(pixels, size, "head.png"), (clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5) * size
+
+
+def errors(found: FoundPoints, true: Float64, unit: float) -> dict[str, float]:
+    """How far each point is off, as a share of a length."""
+    row = point_rows()
+    return {
+        name: float(np.hypot(*(np.array(at) - true[row[name]]))) / unit for name, at in found.points.items()
+    }
+
+
+def test_a_face_s_points_are_found(opengl: None) -> None:
+    photograph, true = rendered(5.0)
+    found = find_front_points(photograph)
+    eyes = float(np.linalg.norm(true[point_rows()["3.5"]] - true[point_rows()["3.6"]]))
+    off = errors(found, true, eyes)
+    assert len(off) > 25
+    assert np.mean(list(off.values())) < 0.06
+    assert found.score > 0.6
+    assert [step.pixels.ndim for step in found.steps] == [3, 3, 3]
+
+
+@pytest.mark.parametrize("yaw", [86.0, -90.0])
+def test_a_profile_s_points_are_found(opengl: None, yaw: float) -> None:
+    photograph, true = rendered(yaw, (600, 720))
+    found = find_side_points(photograph)
+    tall = float(np.linalg.norm(true[point_rows()["9.3"]] - true[point_rows()["2.1"]]))
+    off = errors(found, true, tall)
+    assert {"9.3", "9.15", "8.1", "2.2", "8.2", "2.10"} <= set(off)
+    assert off["9.3"] < 0.06
+    assert np.mean(list(off.values())) < 0.08
+
+
+def test_where_is_no_face_none_is_found() -> None:
+    random = np.random.default_rng(1)
+    noise = random.integers(0, 255, (200, 200, 3)).astype(np.uint8)
+    plain = np.full((200, 200, 3), 128, dtype=np.uint8)
+    for pixels in (noise, plain):
+        photograph = Photograph(pixels, (200, 200), "no.png")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FbaWarning)
+            with pytest.raises(ModelError, match=r"no\.png.*no face was found"):
+                find_front_points(photograph)
+            with pytest.raises(ModelError, match=r"no\.png"):
+                find_side_points(photograph)

@@ -1,0 +1,138 @@
+"""Simplified faces: what they carry, how they move, and levels of detail in files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fba.compiled import is_compiled
+from fba.errors import ModelError
+from fba.face import Deformer, FaceModel
+from fba.face.checks import check_faps, check_neutral
+from fba.face.model import DetailLevel
+from fba.face.simplification import FaceSimplification, level_sizes, simplify_face
+from fba.mesh import read_obj
+from fba.mesh.simplify import simplify
+from fba.parameters import FAP_COUNT
+from small_face import small_face
+
+pytestmark = pytest.mark.skipif(not is_compiled(), reason="too slow without numba")
+SOURCE_STAGES = (2141, 1929, 1307, 680)
+
+
+@pytest.fixture(scope="module")
+def made() -> FaceSimplification:
+    model = replace(FaceModel.default(), levels=())
+    return simplify_face(model, [len(model.triangles) // 3, *SOURCE_STAGES])
+
+
+@pytest.fixture(scope="module")
+def tenth(made: FaceSimplification) -> DetailLevel:
+    return made.build(made.mesh.level(3641))
+
+
+def test_the_stages_of_the_source_are_reached(made: FaceSimplification) -> None:
+    assert [len(made.mesh.level(faces).triangles) for faces in SOURCE_STAGES] == list(SOURCE_STAGES)
+
+
+def test_parts_points_and_looks_are_carried(made: FaceSimplification, tenth: DetailLevel) -> None:
+    full, small = made.model, tenth.model
+    assert len(small.triangles) <= 3641
+    assert [part.name for part in small.parts] == [part.name for part in full.parts]
+    np.testing.assert_array_equal(small.points, full.points)
+    bound = full.bound >= 0
+    np.testing.assert_array_equal(small.vertices[small.bound[bound]], full.vertices[full.bound[bound]])
+    for before, after in zip(full.parts, small.parts, strict=True):
+        assert after.material == before.material
+        assert (after.texcoords is None) == (before.texcoords is None)
+        assert np.linalg.norm(after.normals, axis=1) == pytest.approx(1, abs=1e-3)
+    assert [table.fap for table in small.tables] == [table.fap for table in full.tables]
+    assert sum(len(mesh.vertices) for table in small.tables for mesh in table.meshes) < 12_000
+
+
+def test_feature_points_move_as_on_the_full_face(made: FaceSimplification, tenth: DetailLevel) -> None:
+    values = np.random.default_rng(3).uniform(-150, 150, (4, FAP_COUNT)).astype(np.float32)
+    before = Deformer(made.model).feature_points(values)
+    after = Deformer(tenth.model).feature_points(values)
+    off = np.nanmax(np.linalg.norm(after - before, axis=2), axis=(0,))
+    assert np.nanmedian(off) < 1e-6
+    assert np.nanmax(off) < 2e-3  # of points whose motion would turn a triangle over
+
+
+def test_the_moved_face_stays_near(made: FaceSimplification) -> None:
+    third, tenth = (made.error(made.mesh.level(len(made.model.triangles) // by)) for by in (3, 10))
+    assert third < 0.0018
+    assert tenth < 0.004
+
+
+def test_a_level_within_an_error(made: FaceSimplification) -> None:
+    level = made.within(0.001)
+    assert made.error(level) <= 0.001
+    assert len(level.triangles) < len(made.model.triangles) / 2
+
+
+def test_what_is_wrong_with_a_tenth_by_the_standard(tenth: DetailLevel) -> None:
+    """The neutral face is right. Motions keep theirs; what coarse triangles cannot do are limits and lids."""
+    assert not [finding for finding in check_neutral(tenth.model) if finding.severity == "error"]
+    rules = {finding.rule for finding in check_faps(tenth.model) if finding.severity == "error"}
+    assert rules <= {
+        "no triangle turns over at the limits of its range",
+        "lids meet where their values add up to 1024",
+        "lids do not cut the eyeball",
+    }
+
+
+def test_levels_are_stored_with_the_model(made: FaceSimplification, tmp_path: Path) -> None:
+    levels = tuple(made.build(made.mesh.level(faces)) for faces in (2141, 680))
+    replace(made.model, levels=levels).save(tmp_path / "head.glb")
+    again = FaceModel.load(tmp_path / "head.glb")
+    assert [len(level.model.triangles) for level in again.levels] == [2141, 680]
+    for before, after in zip(levels, again.levels, strict=True):
+        np.testing.assert_array_equal(after.parents, before.parents)
+        np.testing.assert_array_equal(after.model.vertices, before.model.vertices)
+        assert [part.material for part in after.model.parts] == [part.material for part in made.model.parts]
+        values = np.full(FAP_COUNT, 100.0)
+        np.testing.assert_array_equal(Deformer(after.model)(values), Deformer(before.model)(values))
+
+
+def test_levels_that_do_not_belong_are_refused() -> None:
+    face = small_face()
+    right = DetailLevel(face, np.arange(len(face.vertices)))
+    assert replace(face, levels=(right,)).levels == (right,)
+    for level, message in (
+        (DetailLevel(face, np.arange(3)), "parents are needed"),
+        (DetailLevel(face, np.full(len(face.vertices), len(face.vertices))), "parents beyond"),
+        (DetailLevel(replace(face, levels=(right,)), right.parents), "no levels itself"),
+        (DetailLevel(replace(face, parts=(replace(face.parts[0], name="x"), *face.parts[1:]), tables=()),
+                     right.parents), "not those of the face"),
+    ):  # fmt: skip
+        with pytest.raises(ModelError, match=message):
+            replace(face, levels=(level,))
+    assert face.with_tables((), {}).levels == ()
+
+
+def test_level_sizes_fall() -> None:
+    head = FaceModel.default()
+    sizes = level_sizes(head, 4)
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(sizes) == 3  # a fourth would have 382 triangles for 9 parts
+    assert sizes[0] / len(head.triangles) == pytest.approx(0.32, abs=0.01)
+
+
+def test_too_few_triangles_are_refused() -> None:
+    with pytest.raises(ModelError, match="too few for a face of"):
+        simplify_face(FaceModel.default(), 3)
+
+
+def test_flame_is_reduced_to_the_stages_of_the_source(shared: Path) -> None:
+    path = shared / "data" / "foreign" / "heads" / "flame_template.obj"
+    if not path.exists():
+        pytest.skip("FLAME's template is not at hand")
+    mesh = read_obj(path)
+    triangles = mesh.corners.reshape(-1, 3)
+    assert len(triangles) == len(mesh)
+    made = simplify(mesh.vertices[None], triangles, SOURCE_STAGES)
+    assert [len(made.level(faces).triangles) for faces in SOURCE_STAGES] == list(SOURCE_STAGES)

@@ -1,0 +1,278 @@
+"""Memoryless collapses: volume, borders, seams, pinned vertices, history; and bad meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from fba.compiled import is_compiled
+from fba.errors import ModelError
+from fba.mesh.simplify import Level, place_on_level, simplify
+
+pytestmark = pytest.mark.skipif(not is_compiled(), reason="too slow without numba")
+Float64 = npt.NDArray[np.float64]
+Int32 = npt.NDArray[np.int32]
+
+
+def patch(count: int, height: float = 0.0) -> tuple[Float64, Int32]:
+    """A square patch of count x count vertices that bulges by a height in the middle."""
+    x, y = np.meshgrid(np.linspace(0, 1, count), np.linspace(0, 1, count))
+    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    one = np.stack([corner, corner + 1, corner + count], axis=1)
+    other = np.stack([corner + 1, corner + count + 1, corner + count], axis=1)
+    z = height * np.sin(np.pi * x) * np.sin(np.pi * y)
+    return np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1), np.concatenate([one, other]).astype(np.int32)
+
+
+def ball(rings: int = 24, sectors: int = 32) -> tuple[Float64, Int32]:
+    """A closed ball with poles, its seam closed."""
+    angles = np.pi * np.arange(1, rings) / rings
+    around = 2 * np.pi * np.arange(sectors) / sectors
+    side = np.stack(
+        [
+            np.outer(np.sin(angles), np.cos(around)).ravel(),
+            np.outer(np.cos(angles), np.ones(sectors)).ravel(),
+            np.outer(np.sin(angles), -np.sin(around)).ravel(),
+        ],
+        axis=1,
+    )
+    row, column = np.meshgrid(np.arange(rings - 2), np.arange(sectors), indexing="ij")
+    a, b = (row * sectors + column).ravel(), (row * sectors + (column + 1) % sectors).ravel()
+    c, d = a + sectors, b + sectors
+    first = np.arange(sectors)
+    top, bottom = len(side), len(side) + 1
+    last = (rings - 2) * sectors + first
+    caps = [
+        np.stack([np.full(sectors, top), first, (first + 1) % sectors], axis=1),
+        np.stack([np.full(sectors, bottom), (rings - 2) * sectors + (first + 1) % sectors, last], axis=1),
+    ]
+    triangles = np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1), *caps])
+    return np.concatenate([side, [[0, 1, 0], [0, -1, 0]]]), triangles.astype(np.int32)
+
+
+def volume(vertices: Float64, triangles: Int32) -> float:
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
+def edges_once(triangles: Int32) -> set[tuple[int, int]]:
+    ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    found, times = np.unique(ends, axis=0, return_counts=True)
+    return {(int(a), int(b)) for a, b in found[times == 1]}
+
+
+def whole(level: Level) -> Int32:
+    """The triangles between vertices that are one along seams."""
+    return level.points[level.triangles]
+
+
+@pytest.mark.parametrize("faces", [28, 24, 20, 12])
+def test_the_patch_of_5_x_5_keeps_its_border(faces: int) -> None:
+    vertices, triangles = patch(5, 0.3)
+    level = simplify(vertices[None], triangles, faces).level(faces)
+    assert len(level.triangles) == faces
+    border = np.unique(list(edges_once(level.triangles)))
+    at = level.positions[border]
+    outside = (np.abs(at[:, :2] - 0.5).max(axis=1) > 0.5 - 1e-12) & (np.abs(at[:, 2]) < 1e-12)
+    assert outside.all()
+    flat = level.positions.copy()
+    flat[:, 2] = 0
+    a, b, c = (flat[level.triangles[:, k]] for k in range(3))
+    assert np.cross(b - a, c - a)[:, 2].sum() / 2 == pytest.approx(1.0, abs=1e-12)
+
+
+def test_closed_meshes_keep_their_volume() -> None:
+    vertices, triangles = ball()
+    made = simplify(vertices[None], triangles, 40)
+    before = volume(vertices, triangles)
+    assert before > 4
+    for faces in (1000, 400, 100, 40):
+        level = made.level(faces)
+        assert len(level.triangles) <= faces
+        assert volume(level.positions, level.triangles) == pytest.approx(before, rel=1e-9)
+        assert not edges_once(level.triangles)
+        radius = np.linalg.norm(level.positions, axis=1)
+        assert np.abs(radius - 1).max() < 12 / faces
+
+
+def test_every_level_between_can_be_had_back() -> None:
+    vertices, triangles = ball()
+    made = simplify(vertices[None], triangles, 20)
+    assert (np.diff(made.faces) < 0).all()
+    full = made.level(len(triangles))
+    np.testing.assert_array_equal(full.positions, vertices)
+    np.testing.assert_array_equal(full.triangles, triangles)
+    for faces in (1400, 700, 21, 1400):
+        level = made.level(faces)
+        assert len(level.triangles) <= faces < len(level.triangles) + 3
+        assert level.triangles.max() == len(level.positions) - 1
+    np.testing.assert_array_equal(made.after(10**9).triangles, made.level(20).triangles)
+
+
+def test_levels_on_the_way_are_exact_where_a_border_allows_it() -> None:
+    vertices, triangles = patch(33, 0.2)
+    wanted = [1501, 1100, 777, 300, 41]
+    made = simplify(vertices[None], triangles, wanted)
+    assert [len(made.level(faces).triangles) for faces in wanted] == wanted
+
+
+def test_what_moves_in_a_pose_keeps_its_vertices() -> None:
+    vertices, triangles = patch(25)
+    bulged = vertices.copy()
+    right = vertices[:, 0] > 0.5
+    bulged[right, 2] = 0.05 * np.sin(vertices[right, 0] * 40) * np.sin(vertices[right, 1] * 40)
+    level = simplify(np.stack([vertices, bulged]), triangles, 300).level(300)
+    assert (level.positions[:, 0] > 0.5).mean() > 0.85
+
+
+def test_importance_keeps_vertices() -> None:
+    vertices, triangles = ball()
+    importance = np.where(vertices[:, 0] > 0, 1000.0, 1.0)
+    level = simplify(vertices[None], triangles, 200, importance=importance).level(200)
+    assert (level.positions[:, 0] > 0).mean() > 0.75
+
+
+def test_pinned_vertices_stay_where_they_are() -> None:
+    vertices, triangles = ball()
+    pinned = np.zeros(len(vertices), dtype=bool)
+    pinned[::29] = True
+    level = simplify(vertices[None], triangles, 80, pinned=pinned).level(80)
+    np.testing.assert_array_equal(level.positions[level.parents[pinned]], vertices[pinned])
+    np.testing.assert_allclose(level.carry(vertices)[level.parents[pinned]], vertices[pinned], atol=1e-12)
+
+
+def test_a_seam_stays_closed_and_its_sides_keep_their_looks() -> None:
+    """Two halves of a curved patch with a picture each: the vertices between them are there twice."""
+    one, triangles = patch(17, 0.4)
+    other = one.copy()
+    other[:, 0] = 2 - other[:, 0]  # mirrored, so the triangles turn over
+    vertices = np.concatenate([one, other])
+    both = np.concatenate([triangles, triangles[:, ::-1] + len(one)]).astype(np.int32)
+    looks = np.concatenate([one[:, :2], 5 + one[:, :2]])
+    level = simplify(vertices[None], both, 200, looks=looks).level(200)
+    assert len(level.positions) > len(np.unique(level.points))
+    inner = [pair for pair in edges_once(whole(level)) if pair not in outer_edges(level)]
+    assert not inner  # no edge between the halves gapes
+    carried = level.carry(looks)
+    assert not ((carried[:, 0] > 1.001) & (carried[:, 0] < 4.999)).any()  # never a mixture of the pictures
+    sides = carried[level.triangles][:, :, 0] > 3
+    assert (sides.all(axis=1) | ~sides.any(axis=1)).all()
+    moved = level.carry(np.sin(7 * vertices))
+    for point in np.unique(level.points):
+        same = moved[level.points == point]
+        np.testing.assert_allclose(same, same[:1] + np.zeros_like(same), atol=1e-9)
+
+
+def outer_edges(level: Level) -> set[tuple[int, int]]:
+    """Edges once in the whole, both ends on the outline of the two halves."""
+    places = np.zeros((int(level.points.max()) + 1, 3))
+    places[level.points] = level.positions
+    return {
+        (a, b)
+        for a, b in edges_once(whole(level))
+        if all(
+            min(abs(places[v, 0]), abs(places[v, 0] - 2), abs(places[v, 1]), abs(places[v, 1] - 1)) < 1e-9
+            for v in (a, b)
+        )
+    }
+
+
+def test_equal_double_vertices_are_one() -> None:
+    """A soup of triangles, each with vertices of its own, is simplified like the mesh."""
+    vertices, triangles = ball()
+    soup = vertices[triangles.ravel()]
+    level = simplify(soup[None], np.arange(len(soup), dtype=np.int32).reshape(-1, 3), 100).level(100)
+    assert len(level.triangles) == 100
+    assert not edges_once(whole(level))
+
+
+def test_the_full_mesh_lies_on_a_level() -> None:
+    vertices, triangles = ball()
+    level = simplify(vertices[None], triangles, 300).level(300)
+    rows, weights = place_on_level(vertices, level)
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+    assert (weights >= -1e-12).all()
+    on = np.einsum("nk,nkd->nd", weights, level.positions[rows])
+    assert np.linalg.norm(on - vertices, axis=1).max() < 0.05
+
+
+def test_edges_of_three_triangles_stay() -> None:
+    vertices, triangles = patch(9)
+    wall = vertices[:, [0, 2, 1]] * (1, 1, 0.5) + (0, 0.5, 0)  # stands on the middle row
+    wall[:, 2] = vertices[:, 1] * 0.5
+    wall[:, 1] = 0.5
+    both = np.concatenate([triangles, triangles + len(vertices)]).astype(np.int32)
+    together = np.concatenate([vertices, wall])
+    level = simplify(together[None], both, 4).level(4)
+    row = np.flatnonzero(np.abs(vertices[:, 1] - 0.5) < 1e-12)
+    places = {tuple(np.round(place, 9)) for place in level.positions}
+    assert {tuple(np.round(place, 9)) for place in vertices[row]} <= places
+    assert np.isfinite(level.positions).all()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_meshes_stay_meshes(seed: int) -> None:
+    """Torn, doubled, folded and flat: no crash, no triangle of two corners, all indices valid."""
+    random = np.random.default_rng(seed)
+    count = int(random.integers(3, 60))
+    vertices = random.standard_normal((count, 3)) * 10.0 ** random.integers(-6, 6)
+    if seed % 3 == 0:
+        vertices[:, 2] = 0
+    if seed % 4 == 0:
+        vertices[count // 2 :] = vertices[: count - count // 2]
+    triangles = random.integers(0, count, (int(random.integers(1, 150)), 3))
+    poses = np.stack([vertices, vertices + 0.1 * random.standard_normal((count, 3))])
+    made = simplify(poses, triangles, 1, looks=random.integers(0, 2, (count, 1)))
+    for step in range(len(made.faces) + 1):
+        level = made.after(step)
+        if len(level.triangles):
+            assert 0 <= level.triangles.min() <= level.triangles.max() == len(level.positions) - 1
+        assert np.isfinite(level.positions).all()
+        a, b, c = whole(level).T
+        assert not ((a == b) | (b == c) | (c == a)).any()
+
+
+def test_huge_and_tiny_meshes_give_the_same_triangles() -> None:
+    vertices, triangles = ball()
+    levels = [
+        simplify(vertices[None] * scale, triangles, 200).level(200) for scale in (1.0, 2.0**20, 2.0**-20)
+    ]
+    for level in levels[1:]:
+        np.testing.assert_array_equal(level.triangles, levels[0].triangles)
+
+
+def test_a_single_triangle_and_a_tetrahedron_stay() -> None:
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    for triangles in ([[0, 1, 2]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]):
+        made = simplify(corners[None], np.array(triangles), 1)
+        assert len(made.faces) == 0
+        assert len(made.level(1).triangles) == len(triangles)
+
+
+@pytest.mark.parametrize(
+    ("poses", "triangles", "more", "message"),
+    [
+        (np.zeros((3, 3)), [[0, 1, 2]], {}, r"poses must have shape \(K, N, 3\)"),
+        (np.zeros((0, 3, 3)), [[0, 1, 2]], {}, "at least one"),
+        (np.full((1, 3, 3), np.nan), [[0, 1, 2]], {}, "not finite"),
+        (np.zeros((1, 3, 3)), [[0, 1, 3]], {}, "vertices beyond the 3"),
+        (np.zeros((1, 3, 3)), [[0, 1, -1]], {}, "vertices beyond the 3"),
+        (np.zeros((1, 3, 3)), [[0.0, 1, 2]], {}, "whole numbers"),
+        (np.zeros((1, 3, 3)), [0, 1, 2], {}, "whole numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"pinned": np.zeros(2, bool)}, "pinned must be 3 numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"importance": np.full(3, -1.0)}, "importance must be 3 numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"looks": np.zeros((2, 2))}, "looks must have 3 rows"),
+    ],
+)
+def test_meshes_that_do_not_agree_are_refused(
+    poses: Float64, triangles: list[object], more: dict[str, Float64], message: str
+) -> None:
+    with pytest.raises(ModelError, match=message):
+        simplify(poses, np.array(triangles), 1, **more)
+
+
+def test_a_mesh_without_area_gives_no_level() -> None:
+    made = simplify(np.zeros((1, 3, 3)), np.array([[0, 1, 2]]), 1)
+    with pytest.raises(ModelError, match="no triangle is left"):
+        made.level(1)

@@ -1,0 +1,85 @@
+"""The panel that opens and exports files."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import fba
+import graphics
+from fba.animation import Animation
+from fba_player.scene.scene import Scene
+from fba_player.session import _exports
+from fba_player.session._session import Session
+
+graphics.imported("imgui_bundle")
+
+from fba_player._ui.panels._files_panel import FilesPanel  # noqa: E402
+from studio_hand import StudioHand  # noqa: E402
+from tools.window_picture import Studio  # noqa: E402
+
+
+@pytest.fixture
+def studio(talking: Animation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Studio]:
+    monkeypatch.chdir(tmp_path)
+    session = Session(Scene(talking), size=(640, 720))
+    session.open.add("files")
+    with Studio(session) as one:
+        one.settle(4)
+        yield one
+
+
+def panel_of(studio: Studio) -> FilesPanel:
+    return next(panel for panel in studio.gui.panels if isinstance(panel, FilesPanel))
+
+
+def finish(session: Session) -> None:
+    begun = time.monotonic()
+    while session.exports.now is not None:
+        assert time.monotonic() - begun < 120
+        time.sleep(0.05)
+        session.exports.poll()
+
+
+def test_a_stream_of_the_marked_part_is_exported(studio: Studio, tmp_path: Path) -> None:
+    session, panel = studio.session, panel_of(studio)
+    panel._exported = "part.fba"
+    session.transport.mark_in, session.transport.mark_out = 0.08, 0.24
+    studio.settle(2)
+    StudioHand(studio).click(*panel.buttons["Export file"])
+    assert session.exports.now is not None, session.notices()
+    assert session.unsaved
+    finish(session)
+    assert not session.unsaved
+    assert len(fba.read(tmp_path / "part.fba")) == 4
+    assert session.notices()[0].text == "Saved as part.fba"
+    StudioHand(studio).click(*panel.buttons["Export file"])  # it is not overwritten
+    assert session.exports.now is None
+    assert "exists already" in session.notices()[-1].text
+
+
+def test_an_export_is_cancelled(studio: Studio, tmp_path: Path) -> None:
+    session, panel = studio.session, panel_of(studio)
+    panel._exported = "film.gif"
+    studio.settle(1)
+    StudioHand(studio).click(*panel.buttons["Export file"])
+    studio.settle(2)
+    StudioHand(studio).click(*panel.buttons["Cancel export"])
+    assert session.exports.now is None
+    assert not session.rolling
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_program_for_dialogs_it_says_so(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_exports.sys, "platform", "linux")
+    monkeypatch.setattr(_exports.shutil, "which", lambda name: None)
+    assert not _exports.has_dialogs()
+    monkeypatch.setattr(
+        _exports.shutil, "which", lambda name: "/usr/bin/kdialog" if name == "kdialog" else None
+    )
+    assert _exports.has_dialogs()
+    monkeypatch.setattr(_exports.sys, "platform", "win32")
+    assert _exports.has_dialogs()
