@@ -50,21 +50,20 @@ class Style:
                 raise OptionError(f"style: the gain of {name} must lie in 0..2, not {gain}")
 
 
-STYLES = {
-    "mumbled": Style(0.35, 0.5),
-    "relaxed": Style(0.7, 0.8),
-    "normal": Style(),
-    "clear": Style(1.2, 1.2),
-    "overarticulated": Style(1.5, 1.4),
-}
+def find_style(clarity: float) -> Style:
+    """Return the style of a clarity from 0, mumbled, by 0.5, normal, to 1, overarticulated."""
+    jaw, lips = (float(np.interp(clarity, (0, 0.5, 1), gains)) for gains in ((0.35, 1, 1.5), (0.5, 1, 1.4)))
+    return Style(jaw, lips)
 
 
 def _columns(part: str) -> Bool:
-    """Return which FAPs (68,) a part moves: "jaw", "rounding", else all others."""
+    """Return which FAPs (68,) a part moves: "jaw" with the lips that go with it, or "rounding"."""
     names = fap_numbers()
     result = np.zeros(FAP_COUNT, dtype=bool)
     for name, number in names.items():
-        is_jaw = name in ("open_jaw", "depress_chin") or "midlip" in name or "_lip_l" in name or "_lip_r" in name
+        is_jaw = (
+            name in ("open_jaw", "depress_chin") or "midlip" in name or "_lip_l" in name or "_lip_r" in name
+        )
         rounds = name.startswith(("stretch", "push"))
         result[number - 1] = {"jaw": is_jaw, "rounding": rounds}[part]
     return result
@@ -75,7 +74,7 @@ def coarticulate(
     rate: Fraction,
     count: int,
     *,
-    style: Style = STYLES["normal"],
+    style: Style = Style(),
     definitions: Definitions | None = None,
 ) -> FaceTrack:
     """Return a track of `count` frames of the FAPs that visemes move; frame n is at n / rate seconds."""
@@ -112,7 +111,8 @@ def _blend(shapes: Sequence[Shape], rate: Fraction, count: int, table: Float32) 
             both[:, rounding] = ahead[:, None]
         totals[first:last] += both * (shape.size * table[shape.viseme])
         weights[first:last] += both
-    return totals / weights
+    blended: Float64 = totals / weights
+    return blended
 
 
 def _closures(shapes: Sequence[Shape], rate: Fraction, count: int) -> Float64:

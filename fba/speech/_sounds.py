@@ -14,14 +14,14 @@ SILENCE = "SIL"
 FIRST_SHARE = 0.6
 """Share of a diphthong's time that its first viseme takes."""
 STRESS_MARKS = {"ˈ": 1.0, "'": 1.0, "ˌ": 0.7, ",": 0.7}
-LENGTH_MARKS = "ːˑ:̩̯͡‿"
-"""Marks of IPA that do not change what lips show: length, syllables, ties."""
+IGNORED_MARKS = frozenset("ˈˌ'ːˑ:‿|‖ʰʲʷˠˤⁿˡ0123456789")
+"""Marks of IPA that do not change what lips show: stress, length, ties, releases, tones."""
 UNSTRESSED = 0.85
 
 
 @dataclass(frozen=True, slots=True)
 class Phone:
-    """A speech sound. name: in ARPAbet or IPA. start, end: seconds. stress: 1 for the main one, less without."""
+    """A speech sound. name: in ARPAbet or IPA. start, end: seconds. stress: 1 for the main one."""
 
     name: str
     start: float
@@ -36,6 +36,21 @@ class Word:
     text: str
     start: float
     end: float
+
+
+@dataclass(frozen=True)
+class Speech:
+    """What is spoken: phones and words with their times. seconds: length of the sound.
+
+    found: share of the words of the text that are heard in the sound; None without a text. missed: words that
+    are not heard, the first ones.
+    """
+
+    phones: tuple[Phone, ...]
+    words: tuple[Word, ...]
+    seconds: float
+    found: float | None = None
+    missed: tuple[Word, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +99,12 @@ def find_sound(name: str) -> Sound:
     """
     table = _table()
     plain = name.strip().strip("".join(STRESS_MARKS))
-    for key in (plain, plain.upper().rstrip("012"), _without_marks(plain)):
+    for key in (plain, plain.upper().rstrip("012"), strip_marks(plain)):
         if key in table:
             return table[key]
     if not plain:
         return table[SILENCE]
-    known = _without_marks(plain)[:1]  # a letter with further letters or marks that the table does not list
+    known = strip_marks(plain)[:1]  # a letter with further letters or marks that the table does not list
     if known in table and not plain.isascii():
         return table[known]
     raise FormatError(
@@ -98,9 +113,10 @@ def find_sound(name: str) -> Sound:
     )
 
 
-def _without_marks(text: str) -> str:
+def strip_marks(text: str) -> str:
+    """Return a phone of IPA without stress, length, tone and other marks that lips do not show."""
     letters = (letter for letter in unicodedata.normalize("NFD", text) if not unicodedata.combining(letter))
-    return "".join(letter for letter in letters if letter not in LENGTH_MARKS and letter not in "ʰʲʷˠˤⁿˡ")
+    return "".join(letter for letter in letters if letter not in IGNORED_MARKS)
 
 
 def find_shapes(phones: Iterable[Phone]) -> tuple[Shape, ...]:

@@ -6,17 +6,18 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fba.atomic import PathLike
 from fba.errors import FormatError
 from fba.source import naming_file, open_source
-from fba.speech._sounds import SILENCE, Phone, Shape, find_shapes
+from fba.speech._sounds import SILENCE, Phone, Speech, find_sound
 
 MOST_BYTES = 1 << 26
 """Largest file of timings."""
+MOST_HEADER = 4096
+"""Characters of the titles of a table's columns."""
 MOST_SECONDS = 100 * 3600.0
 
 OCULUS = {
@@ -30,20 +31,11 @@ RHUBARB = {"A": 1, "B": 7, "C": 11, "D": 10, "E": 13, "F": 14, "G": 2, "H": 8, "
 """MPEG-4's visemes of Rhubarb's nine mouth shapes, by their letters."""
 
 
-@dataclass(frozen=True)
-class Timings:
-    """What is said when. shapes: visemes in their order. seconds: where the last one ends. kind: of the file."""
-
-    shapes: tuple[Shape, ...]
-    seconds: float
-    kind: str
-
-
-def read_timings(path: PathLike) -> Timings:
+def read_timings(path: PathLike) -> Speech:
     """Return the timings of a file, whose kind is seen by its content.
 
     Praat's TextGrid (long and short, the tier named phones, phonemes or segments, else the only one), NIST's
-    CTM, Rhubarb's JSON and TSV, Azure's visemes as JSON, Oculus' as JSON or CSV, SRT whose texts are phones.
+    CTM, Rhubarb's JSON and TSV, the visemes of Azure and Oculus as JSON, SRT whose texts are phones.
 
     Raises FormatError for a file of no such kind, unknown sounds, or times that run back.
     """
@@ -52,6 +44,12 @@ def read_timings(path: PathLike) -> Timings:
         for kind, fits, parse in _KINDS:
             if fits(text):
                 return _order(parse(text), kind)
+    if "jawopen" in text[:MOST_HEADER].lower():
+        raise FormatError(
+            f"holds ARKit's curves, the motion of a face rather than timings: fba encode {path} -o OUT.fba "
+            "encodes them",
+            path=path,
+        )
     raise FormatError(
         "is no file of timings: TextGrid, CTM, Rhubarb, Azure, Oculus and SRT can be read", path=path
     )
@@ -74,25 +72,30 @@ def _read_text(path: PathLike) -> str:
         raise FormatError(f"is no text in UTF-8 or UTF-16: {error.reason} at byte {error.start}") from None
 
 
-def _order(entries: list[Entry], kind: str) -> Timings:
-    """Return entries as shapes. Raises FormatError for none, or for times that run back or are impossible."""
+def _order(entries: list[Entry], kind: str) -> Speech:
+    """Return entries as phones. Raises FormatError for none, or for times that run back or are impossible."""
     if not entries:
         raise FormatError(f"holds no timings ({kind})")
-    shapes: list[Shape] = []
+    phones: list[Phone] = []
     before = 0.0
     for number, (start, end, what) in enumerate(entries, 1):
         if not (math.isfinite(start) and math.isfinite(end) and 0 <= start <= end <= MOST_SECONDS):
             raise FormatError(f"entry {number} lasts from {start} to {end} s, which is impossible")
         if start < before - 0.0005:
-            raise FormatError(f"entry {number} begins at {start:g} s, before the one before it ends, {before:g} s")
+            raise FormatError(
+                f"entry {number} begins at {start:g} s, before the one before it ends, {before:g} s"
+            )
         if end > start:
             name = what if isinstance(what, str) else _PHONES[what]
             try:
-                shapes += find_shapes([Phone(name, start, end)])
+                find_sound(name)
             except FormatError as error:
                 raise FormatError(f"entry {number}, at {start:g} s: {error}") from None
+            if start > before:
+                phones.append(Phone(SILENCE, before, start))
+            phones.append(Phone(name, start, end))
         before = end
-    return Timings(tuple(shapes), before, kind)
+    return Speech(tuple(phones), (), before)
 
 
 _PHONES = (SILENCE, "P", "F", "TH", "T", "K", "CH", "S", "L", "R", "AA", "EH", "IH", "AO", "UH")
@@ -208,7 +211,15 @@ def _checked(parse: Callable[[str], list[Entry]]) -> Callable[[str], list[Entry]
             return parse(text)
         except FormatError:
             raise
-        except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, StopIteration) as error:
+        except (
+            ValueError,
+            KeyError,
+            IndexError,
+            TypeError,
+            AttributeError,
+            RecursionError,
+            StopIteration,
+        ) as error:
             raise FormatError(f"its timings are damaged: {type(error).__name__}, {error}") from None
 
     return checked
@@ -216,12 +227,18 @@ def _checked(parse: Callable[[str], list[Entry]]) -> Callable[[str], list[Entry]
 
 def _is_ctm(text: str) -> bool:
     line = next((line for line in text.splitlines() if line.strip() and not line.startswith(";;")), "")
-    return re.fullmatch(rf"\S+ \S+ {_NUMBER} {_NUMBER} \S+(?: {_NUMBER})?", " ".join(line.split())) is not None
+    return (
+        re.fullmatch(rf"\S+ \S+ {_NUMBER} {_NUMBER} \S+(?: {_NUMBER})?", " ".join(line.split())) is not None
+    )
 
 
 _KINDS: tuple[tuple[str, Callable[[str], bool], Callable[[str], list[Entry]]], ...] = (
     ("TextGrid", lambda text: "ooTextFile" in text[:40], _checked(_parse_textgrid)),
-    ("Rhubarb", lambda text: text.lstrip()[:1] == "{" and '"mouthCues"' in text, _checked(_parse_rhubarb_json)),
+    (
+        "Rhubarb",
+        lambda text: text.lstrip()[:1] == "{" and '"mouthCues"' in text,
+        _checked(_parse_rhubarb_json),
+    ),
     ("visemes", lambda text: text.lstrip()[:1] in ("[", "{"), _checked(_parse_events)),
     ("SRT", lambda text: re.match(r"\s*\d+\s*\r?\n[^\n]*-->", text) is not None, _checked(_parse_srt)),
     (
