@@ -63,8 +63,8 @@ _NAMES = {
 }  # fmt: skip
 """Public names by the module that they are imported from."""
 _MODULES = (
-    "archive", "audio", "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live", "outlines",
-    "parameters", "persona", "planning", "player", "serving", "speech",
+    "archive", "audio", "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live",
+    "outlines", "parameters", "persona", "planning", "player", "serving", "speech",
 )  # fmt: skip
 
 __all__ = [

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Int16, Int64
+from fba.arrays import Float64, Int16, Int64
 from fba.errors import FormatError, UnsupportedError
-from fba.speech._pieces import RATE, cut_at_pauses
+from fba.speech._pieces import RATE, cut_at_pauses, measure_loudness
 from fba.speech._sounds import SILENCE, STRESS_MARKS, UNSTRESSED, Phone, Speech, Word, find_sound
 from fba.speech._text import ENGLISH, Pronounced
 
@@ -27,7 +27,11 @@ MOST_WORDS = 7.0
 HEARD = 0.45
 """Share of frames whose viseme must be recognised without the text, too, for a word to count as heard."""
 FITS = 0.3
-"""Share of words that must be heard for a text to be the one that is spoken."""
+"""Share of words that must be heard for a text to be the one that is spoken, unless there is noise."""
+SILENT = -60.0
+"""dB below full scale under which nothing is spoken."""
+CLEAR = 20.0
+"""dB between the loud and the quiet parts of a sound, below which noise hides sounds from a recogniser."""
 MISSED_NAMED = 5
 
 
@@ -44,22 +48,26 @@ def find_speech(
     seconds that are done. Long sounds are cut at pauses; memory does not grow with them but for the result.
 
     Raises UnsupportedError without pocketsphinx, FormatError for an empty sound, and for a text of which less
-    than three words in ten are heard.
+    than three words in ten are heard, although there is no noise.
     """
     listener = _Listener(words or (), language)
     phones: list[Phone] = []
     heard: list[Word] = []
     missed: list[Word] = []
     end = 0.0
+    levels: list[Float64] = []
+    aligned_once = False
     for start, sound, last in cut_at_pauses(blocks):
         if not len(sound):
             continue
         end = start + len(sound) / RATE
         free = listener.recognise(sound)
+        levels.append(measure_loudness(sound))
         if words is None:
             phones += _later(free, start)
         else:
             aligned, spoken = listener.align(sound, last, begins=start == 0)
+            aligned_once |= bool(aligned)
             phones += _later(aligned or free, start)
             for word, share in _compare(spoken, aligned, free):
                 (heard if share >= HEARD else missed).append(
@@ -72,7 +80,8 @@ def find_speech(
         return Speech(tuple(_within(phones, end)), (), end)
     share = len(heard) / len(words)
     spoken_words = tuple(sorted([*heard, *missed], key=lambda word: word.start))
-    if share < FITS:
+    quiet, loud = np.percentile(np.concatenate(levels), (10, 95)) if any(map(len, levels)) else (0.0, 0.0)
+    if not aligned_once or (share < FITS and loud - quiet > CLEAR):
         raise FormatError(_unfit(share, len(words), missed, listener.left))
     return Speech(tuple(_within(phones, end)), spoken_words, end, share, tuple(missed[:MISSED_NAMED]))
 
@@ -124,7 +133,11 @@ class _Listener:
             Phone(each.word, each.start_frame * FRAME - PADDING, (each.end_frame + 1) * FRAME - PADDING)
             for each in self._free.seg() or ()
         )
-        return list(_within(found, len(sound) / RATE))
+        levels = measure_loudness(sound)
+        return [
+            Phone(SILENCE, each.start, each.end) if _is_silent(levels, each) else each
+            for each in _within(found, len(sound) / RATE)
+        ]
 
     def align(self, sound: Int16, last: bool, *, begins: bool) -> tuple[list[Phone], list[Word]]:
         """Return the phones and words of the next part of the text in a sound, as far as it is spoken there.
@@ -188,6 +201,12 @@ class _Listener:
             for name, stress, (_, start, length) in zip(names, stresses, parts, strict=True):
                 phones.append(Phone(name, start, start + length, stress))
         return phones, words
+
+
+def _is_silent(levels: Float64, phone: Phone) -> bool:
+    """Whether a sound is too soft for what a recogniser hears in it. levels: dB, a hundred in a second."""
+    part = levels[int(phone.start * 100) : int(phone.end * 100) + 1]
+    return not len(part) or bool(part.max() < SILENT)
 
 
 def _spelled(text: str, english: bool) -> str:

@@ -104,8 +104,8 @@ def _missing_language(language: str, error: Exception | None) -> UnsupportedErro
     short = language.partition("-")[0]
     reason = f" ({error})" if error is not None and str(error) else ""
     return UnsupportedError(
-        f"gruut does not speak {language!r}{reason}; if it knows the language, install it with: "
-        f'pip install "gruut[{short}]"; else give timings of another program'
+        f"gruut does not speak {language!r}{reason}; install its package of the "
+        f"language, gruut_lang_{short}, or give timings of another program"
     )
 
 

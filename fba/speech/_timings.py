@@ -86,7 +86,7 @@ def _order(entries: list[Entry], kind: str) -> Speech:
                 f"entry {number} begins at {start:g} s, before the one before it ends, {before:g} s"
             )
         if end > start:
-            name = what if isinstance(what, str) else _PHONES[what]
+            name = what if isinstance(what, str) else PHONES[what]
             try:
                 find_sound(name)
             except FormatError as error:
@@ -98,7 +98,7 @@ def _order(entries: list[Entry], kind: str) -> Speech:
     return Speech(tuple(phones), (), before)
 
 
-_PHONES = (SILENCE, "P", "F", "TH", "T", "K", "CH", "S", "L", "R", "AA", "EH", "IH", "AO", "UH")
+PHONES = (SILENCE, "P", "F", "TH", "T", "K", "CH", "S", "L", "R", "AA", "EH", "IH", "AO", "UH")
 """A phone that shows each viseme."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -167,12 +167,14 @@ def _parse_rhubarb_tsv(text: str) -> list[Entry]:
 
 
 def _parse_events(text: str) -> list[Entry]:
-    """Azure's and Oculus' events: each lasts until the next; the last for 0.1 s."""
+    """Azure's and Oculus' events: each lasts until the next; the last until its end, else for 0.1 s."""
     events = json.loads(text)
     if isinstance(events, dict):
         events = events.get("visemes", events.get("events"))
     found = [_event(event) for event in events]
-    ends = [start for start, _ in found[1:]] + [found[-1][0] + 0.1] if found else []
+    if not found:
+        return []
+    ends = [*(start for start, _ in found[1:]), float(events[-1].get("end", found[-1][0] + 0.1))]
     return [(start, end, viseme) for (start, viseme), end in zip(found, ends, strict=True)]
 
 
