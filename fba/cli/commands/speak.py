@@ -110,7 +110,7 @@ class _Manner:
         'fba speak --text "Good morning." -o morning.fba    # and morning.wav',
         'fba speak --audio talk.wav --text "What is said in it" -o talk.fba',
         "fba speak --audio talk.wav -o talk.fba    # without a text: rougher",
-        "fba speak --timings talk.TextGrid --coding visemes -o talk.fba",
+        "fba speak --timings cues.json --coding visemes -o talk.fba",
     ),
 )
 @with_options
