@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import shutil
 import sys
 from collections.abc import Iterator
@@ -115,7 +116,7 @@ def test_words_that_nobody_pronounces_are_refused(monkeypatch: pytest.MonkeyPatc
 
 def test_without_the_recogniser_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
-    with pytest.raises(UnsupportedError, match=r'pip install "mpeg4-fba\[speech\]"'):
+    with pytest.raises(UnsupportedError, match=re.escape('pip install "mpeg4-fba[speech]"')):
         find_speech([np.zeros(RATE, dtype=np.int16)])
 
 
