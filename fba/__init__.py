@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from fba import archive as archive
+    from fba import audio as audio
     from fba import body, capture, emotion, face
     from fba import carriage as carriage
     from fba import codec as codec
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from fba import planning as planning
     from fba import player as player
     from fba import serving as serving
+    from fba import speech as speech
     from fba.animation import Animation, BodyTrack, FaceTrack, Frame
     from fba.codec import Decoder, Encoder, StreamInfo, decode
     from fba.encoder_options import EncoderOptions
@@ -61,8 +63,8 @@ _NAMES = {
 }  # fmt: skip
 """Public names by the module that they are imported from."""
 _MODULES = (
-    "archive", "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live", "outlines",
-    "parameters", "persona", "planning", "player", "serving",
+    "archive", "audio", "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live",
+    "outlines", "parameters", "persona", "planning", "player", "serving", "speech",
 )  # fmt: skip
 
 __all__ = [

@@ -37,6 +37,7 @@ fba.codec.settings
 fba.codec._plane
 fba.codec._stream
 fba.codec
+fba.audio
 fba.serving
 fba.carriage
 fba.face.interpolation
@@ -78,6 +79,7 @@ fba.capture.points
 fba.capture
 fba.capture.live
 fba.emotion
+fba.speech
 fba.outlines
 fba.formats
 fba.formats.text

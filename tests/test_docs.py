@@ -45,6 +45,7 @@ COMMAND = re.compile(r"^\s*(\$ |fba |\./dev|python3? |pip |cd |import |from \w+ 
 WINDOW = "opens a window, which stays until somebody closes it"
 ARRIVING = "waits for a stream that arrives over a network"
 SENT = "receives what a telephone sends"
+VOICE = "needs a voice and a recogniser; tests/cli/speech runs the command where they are"
 STORAGE = "needs a storage of S3's kind"
 SYSTEM = "installs system packages"
 CHECKOUT = "sets up or tests the checkout, which .ci/run does"
@@ -74,6 +75,13 @@ ILLUSTRATIONS = {
     ): "watches a network; tests/carriage runs tshark",
     ("docs/capture-points.md", "python3 -m venv tracking"): "needs MediaPipe and its model",
     ("docs/carriage.md", "fba play hello.fba.mp4"): WINDOW,
+    ("docs/speak.md", 'fba speak --text "Good morning. The blue boat moves away." -o morning.fba'): VOICE,
+    ("docs/speak.md", "fba speak --audio talk.wav --text-file talk.txt -o talk.fba"): VOICE,
+    ("docs/speak.md", 'pip install "mpeg4-fba[speech]"'): "makes an environment, as .ci/run does",
+    (
+        "docs/speak.md",
+        'fba speak --audio rede.wav --text "Guten Morgen" --language de-de -o rede.fba',
+    ): VOICE,
     (
         "docs/archives.md",
         "fba archive make streams/ --folders subject,emotion -o s3://training/faces",

@@ -37,6 +37,7 @@ _COMMANDS = {
     "conformance": "Check this codec, or another program, against test vectors.",
     "bench": "Measure the speed of this codec on a stream.",
     "gait": "Generate a walk by stride and character, or find the steps in one.",
+    "speak": "Let a face speak: from a recording, a text, or the timings of other programs.",
     "express": "Show expressions: named ones, mixtures, points of the plane of emotions.",
     "emote": "Play a performance in a mood: angry, surprised, sad, sleepy, happy and others.",
     "emotion": "Read the expressions of a face from any file with FAPs.",

@@ -14,7 +14,16 @@ from fba.cli import options, step_tables, writer_options
 from fba.cli.command import Command, EachFile, as_typed, examples
 from fba.cli.inputs import Reading, input_file, read_model, read_stream
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.outputs import STANDARD, TEXT_FORMATS, Output, Outputs, OutputType, display_name, find_writer
+from fba.cli.outputs import (
+    STANDARD,
+    TEXT_FORMATS,
+    Output,
+    Outputs,
+    OutputType,
+    display_name,
+    find_writer,
+    further_output_option,
+)
 from fba.cli.printing import Progress
 from fba.parameters import BAP_STEPS_AUTO, BapTable
 
@@ -74,6 +83,10 @@ class _Writing:
         help="File for other programs, in the format of its suffix, or a folder with --to.",
     )  # fmt: skip
     to: str | None = options.to_option
+    visemes: Path | None = further_output_option(
+        "OUT.json|.TextGrid",
+        "File for the visemes (FAP 1) with their times: JSON, or TextGrid for Praat and others.",
+    )
     shown: bool = option(
         default=False,
         help="Write what a face shows, as low-level FAPs: also those that a player derives from others, or "
@@ -105,8 +118,8 @@ class _Writing:
                 raise click.UsageError(
                     f"{', '.join(lonely) or '--to'} says how to write --output; give that too"
                 )
-        if not targets:
-            raise click.UsageError("say what to write: --fap, --bap, --epf, --output")
+        if not targets and self.visemes is None:
+            raise click.UsageError("say what to write: --fap, --bap, --epf, --visemes, --output")
         return targets
 
     def takes_model(self) -> bool:
@@ -121,7 +134,7 @@ class _Decoding:
     """How each stream is decoded and written.
 
     settings: for the writer of `--output`. shows: returns the FAPs that a face shows, to be written; None for
-    the FAPs that are sent.
+    the FAPs that are sent. visemes: the file for FAP 1.
     """
 
     targets: list[_Target]
@@ -129,6 +142,7 @@ class _Decoding:
     settings: dict[str, Any]
     reading: Reading
     shows: Callable[[FaceTrack], FaceTrack] | None
+    visemes: Path | None = None
 
     def decode(self, path: Path) -> dict[str, Any]:
         """Decode a stream to its files; return a report."""
@@ -144,6 +158,7 @@ class _Decoding:
         animation, planes = _read(data, _name(path), None in writings, table, self.reading)
         if asked != BAP_STEPS_AUTO:
             step_tables.warn_of_doubt(path, animation, table, marked_table(data))
+        visemes = None if self.visemes is None else _visemes(path, animation, self.visemes)
         if self.shows is not None and animation.face is not None:
             animation = replace(animation, face=self.shows(animation.face))
         parts = {"face": "FAPs", "body": "BAPs"}
@@ -164,6 +179,9 @@ class _Decoding:
                 part = _only(animation, target.writing.carries)
                 self.outputs.write_animation(place, part, target.writing)
             written.append(str(place))
+        if visemes is not None and self.visemes is not None:
+            self.outputs.write(self.visemes, visemes.encode())
+            written.append(str(self.visemes))
         return {"input": str(path), "frames": len(animation), "rate": str(animation.rate), "written": written}
 
 
@@ -177,6 +195,7 @@ class _Decoding:
         "fba decode walk.fba -o walk.bvh --joints moving",
         "fba decode talk.fba -o talk.csv",
         "fba decode talk.fba -o talk.vrma",
+        "fba decode talk.fba --visemes talk.TextGrid",
         "fba decode talk.fba --fap - | less",
         "fba decode archive/*.fba --fap decoded/",
         "fba decode archive/*.fba -o decoded/ --to glb",
@@ -205,16 +224,23 @@ def command(
             raise click.UsageError(
                 f"several inputs need a folder for {target.flag}, and {target.place} is not a folder"
             )
+    listed = [target.output(path) for target in targets for path in inputs]
+    if writing.visemes is not None:
+        if several:
+            raise click.UsageError("--visemes takes one stream at a time; give one input")
+        listed.append(Output("--visemes", writing.visemes, text=True))
     outputs = Outputs(
-        [target.output(path) for target in targets for path in inputs],
+        listed,
         [*inputs, face, writing.options.model, writing.options.body],
         no_clobber=writing.no_clobber,
     )
-    written_as = targets[-1].writing
+    written_as = targets[-1].writing if targets else None
     settings: dict[str, Any] = {}
     if writing.output is not None and written_as is not None:
         settings = writer_options.settings(writing.output, written_as, writing.options)
-    decoding = _Decoding(targets, outputs, settings, reading, _shows(face) if writing.shown else None)
+    decoding = _Decoding(
+        targets, outputs, settings, reading, _shows(face) if writing.shown else None, writing.visemes
+    )
     reports = []
     each = EachFile(inputs)
     with Progress("decoding", len(inputs)) as step:
@@ -237,6 +263,16 @@ def _shows(model: Path | None) -> Callable[[FaceTrack], FaceTrack]:
 
     face = read_model(model)
     return lambda track: shown_faps(track, face)
+
+
+def _visemes(path: Path, animation: Animation, output: Path) -> str:
+    """Return the file of the visemes that a stream sends."""
+    from fba.speech import format_visemes, read_shapes
+
+    shapes = read_shapes(animation)
+    if not shapes:
+        raise click.UsageError(f"{path} sends no visemes (FAP 1); leave --visemes out")
+    return format_visemes(shapes, "textgrid" if output.suffix.lower() == ".textgrid" else "json")
 
 
 def _name(source: Path) -> str:

@@ -10,8 +10,8 @@ from typing import Any
 
 from fba.arrays import UInt8
 from fba.atomic import PathLike, atomic_path, write_error
+from fba.audio.pyav import av_version, import_av
 from fba.errors import DisplayError
-from fba_player.sound._pyav import av_version, import_av
 from fba_player.sound.soundtrack import FilmedSound, Soundtrack
 
 ENCODERS = ("libx264", "libopenh264", "h264")

@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import Any
 
 from fba.atomic import PathLike
+from fba.audio.sound_file import CHANNELS, SoundFile
 from fba.errors import FbaWarning
 from fba_player.gl._context import cure
 from fba_player.playback._transport import Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
-from fba_player.sound.audio_file import CHANNELS, SoundFile
 from fba_player.sound.soundtrack import find_sound_beside
 from fba_player.view.protocols import Closing
 

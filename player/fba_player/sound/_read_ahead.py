@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from fba.arrays import Int16
+from fba.audio.sound_file import CHANNELS, SoundFile
 from fba.errors import FbaError
 from fba_player.playback._playhead import Motion
-from fba_player.sound.audio_file import CHANNELS, SoundFile
 
 BLOCK_SECONDS = 0.5
 """Length of a block, in seconds."""

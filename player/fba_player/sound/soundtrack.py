@@ -13,11 +13,11 @@ import numpy as np
 
 from fba.arrays import Float32, Int16
 from fba.atomic import PathLike
+from fba.audio.pyav import import_av
+from fba.audio.sound_file import CHANNELS, SoundFile, open_sound
 from fba.errors import FormatError
 from fba_player.playback._transport import Transport
 from fba_player.sound._mixer import SoundMixer
-from fba_player.sound._pyav import import_av
-from fba_player.sound.audio_file import CHANNELS, SoundFile, open_sound
 
 AAC_RATES = (96000, 88200, 64000, 48000, 44100, 32000, 24000, 22050, 16000, 12000, 11025, 8000)
 AAC_FRAME = 1024

@@ -16,10 +16,10 @@ import pytest
 
 import fba
 from fba.arrays import Float64
+from fba.audio.sound_file import SoundFile
 from fba.carriage.mp4 import list_tracks, read_mp4, write_mp4
 from fba.cli.scenes import SoundOptions, find_offset, find_sound
 from fba.codec import encode_animation, marked_table
-from fba_player.sound.audio_file import SoundFile
 from fba_player.sound.coded_sound import read_coded_sound
 from joinable_streams import JOINABLE, performance
 from mp4_files import Track, whole_file

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
+from fba.audio.sound_file import SoundFile
 from fba.errors import FbaWarning, FormatError
 from fba_player.playback._playhead import Motion
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Transport
 from fba_player.sound._player import Audio, find_sound_beside, open_audio
 from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
-from fba_player.sound.audio_file import SoundFile
 from player_tracks import face_track
 
 av = pytest.importorskip("av")

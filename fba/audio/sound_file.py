@@ -6,15 +6,14 @@ import warnings
 from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from fba.arrays import Int16
 from fba.atomic import PathLike
+from fba.audio.pyav import av_version, import_av
 from fba.errors import FbaWarning, FormatError
-from fba_player.sound._pyav import av_version, import_av
-from fba_player.view.protocols import Closing
 
 CHANNELS = 2
 PLAYABLE_RATES = (8000, 192_000)
@@ -52,11 +51,12 @@ def open_sound(av: Any, path: Path) -> tuple[Any, Any]:
     return container, stream
 
 
-class SoundFile(Closing):
+class SoundFile:
     """The first audio track of a file, as stereo samples at one rate.
 
     path: WAV, MP3, FLAC, OGG, M4A: anything that FFmpeg reads. rates: samples per second that need no
-    resampling; by default those that devices play. rate: that of the samples. duration: seconds as stated in
+    resampling; by default those that devices play. Others become 48 kHz, or the highest of `rates` where 48
+    kHz is not among them. rate: that of the samples. duration: seconds as stated in
     the file; None where it does not say. mono: whether there is one channel, which goes to both sides. More
     than two channels are mixed down. start: seconds at which the file presents the first sample.
 
@@ -109,6 +109,12 @@ class SoundFile(Closing):
         self._next = at
         return np.concatenate([np.zeros((0, CHANNELS), dtype=np.int16), *pieces])
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
         """Close the file; safe to call twice."""
         self._parts = iter(())
@@ -125,7 +131,9 @@ class SoundFile(Closing):
         if not low <= rate <= high:
             raise FormatError(f"claims {rate} samples a second; {low} to {high} can be read", path=self.path)
         fits = rate in self._rates if self._rates else PLAYABLE_RATES[0] <= rate <= PLAYABLE_RATES[1]
-        return rate if fits else USUAL_RATE
+        return (
+            rate if fits else USUAL_RATE if not self._rates or USUAL_RATE in self._rates else max(self._rates)
+        )
 
     def _seek(self, start: int) -> int:
         """Let `_parts` begin at or before a sample; return the number of the sample after `_rest`."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from fba.errors import DisplayError
-from fba_player.gl._context import cure
 
 
 def import_av(purpose: str = "films need") -> Any:
@@ -15,7 +14,7 @@ def import_av(purpose: str = "films need") -> Any:
     except ImportError as error:
         raise DisplayError(
             f"{purpose} the Python package av (PyAV), which cannot be imported: {error}. "
-            + cure(error, "mpeg4-fba[films]")
+            'Install it with: pip install "mpeg4-fba[films]"'
         ) from error
     return av
 

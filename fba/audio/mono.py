@@ -1,0 +1,83 @@
+"""Sound as a single channel at a rate, in blocks, for those that listen to it."""
+
+from __future__ import annotations
+
+import importlib.util
+import wave
+from collections.abc import Iterator
+from math import gcd
+
+import numpy as np
+
+from fba.arrays import Float32, Int16
+from fba.atomic import PathLike
+from fba.audio.sound_file import SoundFile
+from fba.errors import DisplayError
+
+BLOCK_SECONDS = 1.0
+
+
+def read_mono(path: PathLike, rate: int) -> Iterator[Int16]:
+    """Yield the samples of a file as int16 (N,), about a second at a time, all channels mixed.
+
+    rate: samples per second to resample to. Any file that FFmpeg reads; without PyAV, WAV files with 16 bits.
+
+    Raises FormatError for a file that is no sound, DisplayError without PyAV for files that need it.
+    """
+    if importlib.util.find_spec("av") is None:
+        yield from _read_wave(path, rate)
+        return
+    with SoundFile(path, (rate,)) as sound:
+        block, start = round(BLOCK_SECONDS * rate), 0
+        while len(samples := sound.read(start, block)):
+            start += len(samples)
+            yield samples[:, 0].copy() if sound.mono else _mix(samples)
+
+
+def _mix(samples: Int16) -> Int16:
+    return np.asarray(samples.astype(np.int32).mean(axis=1).round(), dtype=np.int16)
+
+
+def _read_wave(path: PathLike, rate: int) -> Iterator[Int16]:
+    """Yield the samples of a WAV file, by the standard library alone."""
+    needed = 'sound other than WAV with 16 bits needs PyAV: pip install "mpeg4-fba[films]"'
+    try:
+        with wave.open(str(path), "rb") as file:
+            width, channels, own = file.getsampwidth(), file.getnchannels(), file.getframerate()
+            if width != 2 or not 1000 <= own <= 200_000:
+                raise DisplayError(f"{path}: {width * 8} bits at {own} Hz; {needed}")
+            resampler = Resampler(own, rate)
+            while data := file.readframes(own):
+                samples = np.frombuffer(data[: len(data) // (2 * channels) * 2 * channels], dtype="<i2")
+                yield resampler(_mix(samples.reshape(-1, channels)))
+    except (wave.Error, EOFError) as error:
+        raise DisplayError(f"{path}: {error or 'is cut off'}; {needed}") from error
+
+
+class Resampler:
+    """Converts samples from one rate to another, block by block, with a delay of nothing.
+
+    source, target: samples per second. Blocks are filtered one by one, with the end of the last one before
+    them.
+    """
+
+    def __init__(self, source: int, target: int) -> None:
+        common = gcd(source, target)
+        self._up, self._down = target // common, source // common
+        self._context: Float32 = np.zeros(0, dtype=np.float32)
+        self._kept = -(-source // 10 // self._down) * self._down  # a tenth of a second, whole periods
+        self._rest: Int16 = np.zeros(0, dtype=np.int16)
+
+    def __call__(self, samples: Int16) -> Int16:
+        """Return the resampled samples int16 of a block, as far as they are whole."""
+        if self._up == self._down:
+            return samples
+        from scipy.signal import resample_poly
+
+        samples = np.concatenate([self._rest, samples])
+        whole = len(samples) // self._down * self._down
+        self._rest = samples[whole:]
+        block = np.concatenate([self._context, samples[:whole].astype(np.float32)])
+        made = resample_poly(block, self._up, self._down)[len(self._context) // self._down * self._up :]
+        self._context = block[max(len(block) - self._kept, 0) :]
+        return np.asarray(np.clip(np.rint(made), -32768, 32767), dtype=np.int16)

@@ -1,0 +1,299 @@
+"""When each word and phone is spoken: forced alignment and phone recognition by pocketsphinx.
+
+Its acoustic model is of US English. Words of other languages are aligned by the sounds of English that are
+most like theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from fba.arrays import Float64, Int16, Int64
+from fba.errors import FormatError, UnsupportedError
+from fba.speech._pieces import RATE, cut_at_pauses, measure_loudness
+from fba.speech._sounds import SILENCE, STRESS_MARKS, UNSTRESSED, Phone, Speech, Word, find_sound
+from fba.speech._text import ENGLISH, Pronounced
+
+FRAME = 0.01
+"""Seconds of the recogniser's frames."""
+PADDING = 0.2
+"""Seconds of silence put before and behind the sound: the recogniser needs some to start and end with."""
+VOWELS = frozenset(["AA", "AE", "AH", "AO", "AW", "AY", "EH", "ER", "EY", "IH", "IY", "OW", "OY", "UH", "UW"])
+MOST_WORDS = 7.0
+"""Words in a second, at most."""
+HEARD = 0.45
+"""Share of frames whose viseme must be recognised without the text, too, for a word to count as heard."""
+FITS = 0.3
+"""Share of words that must be heard for a text to be the one that is spoken, unless there is noise."""
+SILENT = -60.0
+"""dB below full scale under which nothing is spoken."""
+CLEAR = 20.0
+"""dB between the loud and the quiet parts of a sound, below which noise hides sounds from a recogniser."""
+MISSED_NAMED = 5
+
+
+def find_speech(
+    blocks: Iterable[Int16],
+    words: Sequence[Pronounced] | None = None,
+    *,
+    language: str = ENGLISH,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Speech:
+    """Return when the words and phones of a text are spoken in a sound; without words, its phones.
+
+    blocks: int16 (N,), 16 kHz, of any length, read once. words: of `split_text`. progress: called with the
+    seconds that are done. Long sounds are cut at pauses; memory does not grow with them but for the result.
+
+    Raises UnsupportedError without pocketsphinx, FormatError for an empty sound, and for a text of which less
+    than three words in ten are heard, although there is no noise.
+    """
+    listener = _Listener(words or (), language)
+    phones: list[Phone] = []
+    heard: list[Word] = []
+    missed: list[Word] = []
+    end = 0.0
+    levels: list[Float64] = []
+    aligned_once = False
+    for start, sound, last in cut_at_pauses(blocks):
+        if not len(sound):
+            continue
+        end = start + len(sound) / RATE
+        free = listener.recognise(sound)
+        levels.append(measure_loudness(sound))
+        if words is None:
+            phones += _later(free, start)
+        else:
+            aligned, spoken = listener.align(sound, last, begins=start == 0)
+            aligned_once |= bool(aligned)
+            phones += _later(aligned or free, start)
+            for word, share in _compare(spoken, aligned, free):
+                (heard if share >= HEARD else missed).append(
+                    Word(word.text, word.start + start, word.end + start)
+                )
+        progress(end)
+    if not end:
+        raise FormatError("the sound is empty: it has no samples")
+    if words is None:
+        return Speech(tuple(_within(phones, end)), (), end)
+    share = len(heard) / len(words)
+    spoken_words = tuple(sorted([*heard, *missed], key=lambda word: word.start))
+    quiet, loud = np.percentile(np.concatenate(levels), (10, 95)) if any(map(len, levels)) else (0.0, 0.0)
+    if not aligned_once or (share < FITS and loud - quiet > CLEAR):
+        raise FormatError(_unfit(share, len(words), missed, listener.left))
+    return Speech(tuple(_within(phones, end)), spoken_words, end, share, tuple(missed[:MISSED_NAMED]))
+
+
+def _unfit(share: float, count: int, missed: Sequence[Word], left: Sequence[Pronounced]) -> str:
+    where = [f"{word.text!r} at {word.start:.1f} s" for word in missed[:MISSED_NAMED]]
+    where += [f"{left[0].text!r} and what follows it"] if left else []
+    return (
+        f"the text does not fit the sound: {share:.0%} of its {count} words are heard"
+        f"{'; missing are ' if where else ''}{', '.join(where)}; give the words that are spoken, or no text"
+    )
+
+
+class _Listener:
+    """Recognisers that take a sound piece by piece, and a text as far as they have come in it."""
+
+    def __init__(self, words: Sequence[Pronounced], language: str) -> None:
+        self.left = list(words)
+        self._english = language.startswith("en")
+        from_model = _model_path("en-us/en-us-phone.lm.bin")
+        self._free = _decoder(allphone=from_model, lw=2.0, pip=0.3)
+        self._forced: Any = _decoder(lm=None, bestpath=False) if words else None
+        self._names: dict[str, list[str]] = {}  # of the phones in IPA, by words that the model lacks
+        self._stresses: dict[str, tuple[float, ...]] = {}  # of vowels, by words
+        for word in dict.fromkeys(words):
+            self._learn(word)
+
+    def _learn(self, word: Pronounced) -> None:
+        marks = [next((STRESS_MARKS[m] for m in phone if m in STRESS_MARKS), 0.0) for phone in word.phones]
+        pairs = word.arpabet
+        self._stresses[word.text] = tuple(
+            mark for mark, phone in zip(marks, word.phones, strict=True) if _is_vowel(phone)
+        )
+        known = self._english and self._forced.lookup_word(word.text) is not None
+        if known or word.text in self._names:
+            return
+        if not pairs:
+            raise UnsupportedError(
+                f"no pronunciation is known of {word.text!r}; the package gruut finds one: "
+                'pip install "mpeg4-fba[speech]"'
+            )
+        self._names[word.text] = [phone for _, phone in pairs]
+        self._forced.add_word(_spelled(word.text, self._english), " ".join(name for name, _ in pairs), True)
+
+    def recognise(self, sound: Int16) -> list[Phone]:
+        """Return the phones of a sound without a text."""
+        _run(self._free, sound)
+        found = (
+            Phone(each.word, each.start_frame * FRAME - PADDING, (each.end_frame + 1) * FRAME - PADDING)
+            for each in self._free.seg() or ()
+        )
+        levels = measure_loudness(sound)
+        return [
+            Phone(SILENCE, each.start, each.end) if _is_silent(levels, each) else each
+            for each in _within(found, len(sound) / RATE)
+        ]
+
+    def align(self, sound: Int16, last: bool, *, begins: bool) -> tuple[list[Phone], list[Word]]:
+        """Return the phones and words of the next part of the text in a sound, as far as it is spoken there.
+
+        last, begins: whether it is the last, and the first, of the sound's pieces.
+        """
+        seconds = len(sound) / RATE
+        most = int(seconds * MOST_WORDS) + 4
+        take = len(self.left)
+        if not (last and take <= most):
+            take = self._count_spoken(sound, self.left[:most])
+        elif last and begins and not self.left:
+            take = 0
+        spoken, self.left = self.left[:take], self.left[take:]
+        return self._force(sound, spoken) if spoken else ([], [])
+
+    def _count_spoken(self, sound: Int16, words: Sequence[Pronounced]) -> int:
+        """Return how many of the words are spoken, from the first on, by a grammar of all beginnings."""
+        if not words:
+            return 0
+        names = [_spelled(word.text, self._english) for word in words]
+        end = len(names) + 1
+        steps: list[tuple[Any, ...]] = [(at, at + 1, 0.9, name) for at, name in enumerate(names)]
+        steps += [(at, end, 0.1) for at in range(len(names) + 1)]
+        self._forced.add_fsg("beginnings", self._forced.create_fsg("beginnings", 0, end, steps))
+        self._forced.activate_search("beginnings")
+        try:
+            _run(self._forced, sound)
+            found = self._forced.hyp()
+        except RuntimeError:
+            return 0
+        return 0 if found is None else len(found.hypstr.split())
+
+    def _force(self, sound: Int16, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Word]]:
+        self._forced.set_align_text(" ".join(_spelled(word.text, self._english) for word in spoken))
+        try:
+            _run(self._forced, sound)
+            self._forced.set_alignment()
+            _run(self._forced, sound)
+            alignment = self._forced.get_alignment()
+        except RuntimeError:
+            alignment = None
+        if alignment is None:  # nothing in the sound is like the words
+            return [], [Word(word.text, 0.0, len(sound) / RATE) for word in spoken]
+        return self._collect(alignment, spoken)
+
+    def _collect(self, alignment: Any, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Word]]:
+        phones: list[Phone] = []
+        words: list[Word] = []
+        for item in alignment:
+            parts = [(p.name, p.start * FRAME - PADDING, p.duration * FRAME) for p in item]
+            if item.name.startswith(("<", "+", "[")) or len(words) == len(spoken):
+                phones += [Phone(name, start, start + length) for name, start, length in parts]
+                continue
+            text, start = spoken[len(words)].text, item.start * FRAME - PADDING
+            words.append(Word(text, start, start + item.duration * FRAME))
+            names = self._names.get(text, [name for name, _, _ in parts])
+            if len(names) != len(parts):
+                names = [name for name, _, _ in parts]
+            stresses = _spread(self._stresses.get(text, ()), [name for name, _, _ in parts], text)
+            for name, stress, (_, start, length) in zip(names, stresses, parts, strict=True):
+                phones.append(Phone(name, start, start + length, stress))
+        return phones, words
+
+
+def _is_silent(levels: Float64, phone: Phone) -> bool:
+    """Whether a sound is too soft for what a recogniser hears in it. levels: dB, a hundred in a second."""
+    part = levels[int(phone.start * 100) : int(phone.end * 100) + 1]
+    return not len(part) or bool(part.max() < SILENT)
+
+
+def _spelled(text: str, english: bool) -> str:
+    """Return a word as the dictionary has it: words of other languages must not meet English ones there."""
+    return text if english else f"~{text}"
+
+
+def _is_vowel(phone: str) -> bool:
+    return max(find_sound(phone).visemes) > 9
+
+
+def _spread(stresses: Sequence[float], names: Sequence[str], text: str) -> list[float]:
+    """Return the stress of each phone. Without stresses for all vowels, the first of a long word has it."""
+    vowels = [at for at, name in enumerate(names) if name in VOWELS]
+    if len(stresses) != len(vowels):
+        stresses = [1.0 if at == 0 and len(text) > 3 else 0.0 for at in range(len(vowels))]
+    result = [1.0] * len(names)
+    for at, stress in zip(vowels, stresses, strict=True):
+        result[at] = UNSTRESSED + (1 - UNSTRESSED) * stress
+    return result
+
+
+def _model_path(name: str) -> str:
+    try:
+        from pocketsphinx import get_model_path
+    except (ImportError, OSError) as error:
+        raise UnsupportedError(
+            f"speech is found in sound by the package pocketsphinx, which cannot be imported: {error}. "
+            'Install it with: pip install "mpeg4-fba[speech]"; it has no wheels for Python 3.14 and later'
+        ) from error
+    return str(get_model_path(name))
+
+
+def _decoder(**options: Any) -> Any:
+    from pocketsphinx import Decoder
+
+    return Decoder(beam=1e-80, wbeam=1e-60, pbeam=1e-80, loglevel="FATAL", **options)
+
+
+def _run(decoder: Any, sound: Int16) -> None:
+    silence = np.zeros(round(PADDING * RATE), dtype=np.int16)
+    decoder.start_utt()
+    decoder.process_raw(np.concatenate([silence, sound, silence]).tobytes(), full_utt=True)
+    decoder.end_utt()
+
+
+def _later(phones: Iterable[Phone], seconds: float) -> list[Phone]:
+    return [Phone(each.name, each.start + seconds, each.end + seconds, each.stress) for each in phones]
+
+
+def _within(phones: Iterable[Phone], seconds: float) -> Iterator[Phone]:
+    """Yield phones cut to the sound, with silence where there is none."""
+    at = 0.0
+    for phone in phones:
+        start, end = max(phone.start, at), min(phone.end, seconds)
+        if end <= start:
+            continue
+        if start > at + 1e-6:
+            yield Phone(SILENCE, at, start)
+        yield Phone(phone.name, start, end, phone.stress)
+        at = end
+    if at < seconds:
+        yield Phone(SILENCE, at, seconds)
+
+
+def _compare(
+    words: Sequence[Word], aligned: Sequence[Phone], free: Sequence[Phone]
+) -> Iterator[tuple[Word, float]]:
+    """Yield words, each with the share of frames in which both ways to hear agree on the viseme.
+
+    The frames are those of the word and of its neighbours: short words alone would say little.
+    """
+    count = round(max([phone.end for phone in (*aligned, *free)], default=0.0) / FRAME) + 1
+    same = _visemes(aligned, count) == _visemes(free, count)
+    parts = [same[max(round(word.start / FRAME), 0) : round(word.end / FRAME)] for word in words]
+    for at, word in enumerate(words):
+        if not aligned:
+            yield word, 0.0
+            continue
+        around = np.concatenate(parts[max(at - 1, 0) : at + 2])
+        yield word, float(around.mean()) if len(around) else 0.0
+
+
+def _visemes(phones: Iterable[Phone], count: int) -> Int64:
+    result = np.zeros(count, dtype=np.int64)
+    for phone in phones:
+        result[max(round(phone.start / FRAME), 0) : round(phone.end / FRAME)] = find_sound(
+            phone.name
+        ).visemes[0]
+    return result

@@ -1,0 +1,122 @@
+"""Speech as an animation of a face, coded as visemes (FAP 1) or as low-level FAPs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.arrays import Array, Float64, Int64
+from fba.encoder_options import EncoderOptions
+from fba.errors import OptionError
+from fba.parameters import FAP_COUNT
+from fba.speech._coarticulation import REACH, coarticulate, find_style
+from fba.speech._life import Life, find_life
+from fba.speech._prosody import Prosody
+from fba.speech._sounds import Shape, Speech, find_shapes
+from fba.speech._visemes import CLOSED, MOST_BLEND, find_keys, nearest_blend
+from fba.tracks import FaceTrack
+
+Coding = Literal["visemes", "faps"]
+QUANT = 16
+"""Quantiser of low-level FAPs: with it the lips err by half a millimetre more than without."""
+AT_ONCE = 3000
+"""Frames that are coarticulated at once."""
+_INNER, _OUTER = 4, 51
+"""The first FAPs of the inner and of the outer contour of the lips, of ten each."""
+
+
+def perform(
+    speech: Speech,
+    *,
+    rate: Fraction = Fraction(25),
+    coding: Coding = "faps",
+    style: float = 0.5,
+    life: float = 0.5,
+    prosody: Prosody | None = None,
+) -> Animation:
+    """Return the animation of a face that speaks; players move it linearly between its frames.
+
+    rate: frames in a second that can be sent. coding: visemes (FAP 1), or faps: low-level FAPs with
+    coarticulation. style: from 0, mumbled, by 0.5 to 1, overarticulated; lips close in any style. life: 0 for
+    the mouth alone, to 1: nods, brows, blinks and glances. prosody: of the sound, if there is one.
+
+    Raises OptionError for numbers outside of 0 to 1.
+    """
+    for name, value in (("style", style), ("life", life)):
+        if not 0 <= value <= 1:
+            raise OptionError(f"{name} must be from 0 to 1, not {value:g}")
+    shapes = find_shapes(speech.phones)
+    motion = find_life(speech, rate, life, prosody)
+    keys = find_keys(shapes, rate)
+    last = max(round(speech.seconds * rate), 1)
+    if not keys or keys[0][0] > 0:
+        keys.insert(0, (0, Shape(0, 0.0, 0.0, 1.0, 0.0)))
+    keys = [key for key in keys if key[0] <= last]
+    if keys[-1][0] < last:
+        keys.append((last, keys[-1][1]))
+    frames = {frame for frame, _ in keys} | {frame for frame in motion.frames if frame <= last}
+    index = np.array(sorted(frames), dtype=np.int64)
+    face = _as_visemes(keys, index, style) if coding == "visemes" else _as_faps(shapes, index, rate, style)
+    return Animation(face=_with_life(face, motion, index), body=None, rate=rate, index=index)
+
+
+def encoder_options(coding: Coding) -> EncoderOptions:
+    """Return how an animation of `perform` is encoded."""
+    return EncoderOptions(preset="compact", fap_quant=1 if coding == "visemes" else QUANT)
+
+
+def _as_visemes(keys: Sequence[tuple[int, Shape]], index: Int64, style: float) -> FaceTrack:
+    """Return FAP 1 in frames: between two key frames, a blend of theirs."""
+    times = [frame for frame, _ in keys]
+    fields: Array = np.zeros((len(index), 4), dtype=np.int16)
+    gain = min(find_style(style).lips, 1.0)
+    for row, frame in enumerate(index.tolist()):
+        at = int(np.searchsorted(times, frame, side="right")) - 1
+        shape = keys[at][1]
+        size = shape.size if shape.viseme in CLOSED else shape.size * gain
+        fields[row, :3] = shape.viseme, 0, nearest_blend(size) if shape.viseme else MOST_BLEND
+        if frame > times[at] and at + 1 < len(keys) and keys[at + 1][1].viseme != shape.viseme:
+            share = (frame - times[at]) / (times[at + 1] - times[at])
+            fields[row, :3] = shape.viseme, keys[at + 1][1].viseme, nearest_blend(1 - share)
+    mask = np.zeros((len(index), FAP_COUNT), dtype=bool)
+    mask[:, 0] = True
+    return FaceTrack(np.zeros((len(index), FAP_COUNT), dtype=np.int32), mask, viseme=fields)
+
+
+def _as_faps(shapes: Sequence[Shape], index: Int64, rate: Fraction, style: float) -> FaceTrack:
+    """Return low-level FAPs in frames. The outer contour of the lips follows the inner one, which is sent."""
+    values = np.zeros((len(index), FAP_COUNT), dtype=np.int32)
+    mask = np.zeros((len(index), FAP_COUNT), dtype=bool)
+    reach, begin = round(REACH * rate) + 1, 0
+    for first in range(0, int(index[-1]) + 1, AT_ONCE):
+        rows = np.flatnonzero((index >= first) & (index < first + AT_ONCE))
+        start = max(first - reach, 0)
+        while begin < len(shapes) and shapes[begin].end * rate < start:
+            begin += 1
+        end = begin
+        while end < len(shapes) and shapes[end].start * rate < first + AT_ONCE + reach:
+            end += 1
+        moved = [
+            replace(each, start=each.start - float(start / rate), end=each.end - float(start / rate))
+            for each in shapes[begin:end]
+        ]
+        track = coarticulate(moved, rate, first + AT_ONCE - start, style=find_style(style))
+        values[rows], mask[rows] = track.values[index[rows] - start], track.mask[index[rows] - start]
+    inner, outer = (slice(begin - 1, begin + 9) for begin in (_INNER, _OUTER))
+    values[:, outer], mask[:, outer] = values[:, inner], mask[:, inner]
+    return FaceTrack(values, mask)
+
+
+def _with_life(face: FaceTrack, motion: Life, index: Int64) -> FaceTrack:
+    if not motion.keys:
+        return face
+    values, mask = face.values.copy(), face.mask.copy()
+    moved: Float64 = motion.values(index)
+    values[:, motion.faps] += np.rint(moved[:, motion.faps]).astype(np.int32)
+    mask[:, motion.faps] = True
+    return FaceTrack(values, mask, viseme=face.viseme)

@@ -1,0 +1,86 @@
+"""Speech as FAP 1: visemes in the frames where the mouth arrives at them, and visemes out of FAP 1."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+
+from fba.animation import Animation
+from fba.speech._sounds import Shape
+
+MOST_BLEND = 63
+CLOSED = (1, 2)
+"""Visemes at which the lips, or lip and teeth, meet."""
+LONG = 0.22
+"""Seconds from which a viseme is held: it has a key frame at its begin and at its end."""
+INSET = 0.06
+"""Seconds from begin and end of a held viseme to its key frames."""
+APART = Fraction(7, 100)
+"""Seconds between key frames; of two that are nearer, the weaker is left out."""
+SHORT, WEAK = 0.08, 0.3
+"""Seconds and weight up to which a viseme gives way to its neighbours."""
+BLENDS = (0, 21, 42, 63)
+"""Blends that are sent: few different ones take fewer bits."""
+
+
+def find_keys(shapes: Sequence[Shape], rate: Fraction) -> list[tuple[int, Shape]]:
+    """Return frames at which the mouth shows a viseme, in their order; between them it moves linearly.
+
+    Frame n is at n / rate seconds. Closures are always among them; of others that are too near to each other,
+    the one that weighs more.
+    """
+    wanted: list[tuple[float, Shape]] = []
+    for shape in shapes:
+        length = shape.end - shape.start
+        if length >= LONG and shape.viseme not in CLOSED:
+            wanted += [(shape.start + INSET, shape), (shape.end - INSET, shape)]
+        elif shape.viseme in CLOSED or length > SHORT or shape.weight > WEAK:
+            wanted.append((shape.centre, shape))
+    keys: list[tuple[int, Shape]] = []
+    for moment, shape in wanted:
+        frame = round(moment * rate)
+        while keys and frame - keys[-1][0] < APART * rate and _rank(keys[-1][1]) < _rank(shape):
+            keys.pop()
+        free = frame - keys[-1][0] if keys else APART * rate
+        if free >= APART * rate or (shape.viseme in CLOSED and free > 0):
+            keys.append((frame, shape))
+    return keys
+
+
+def _rank(shape: Shape) -> tuple[bool, float]:
+    return shape.viseme in CLOSED, shape.weight
+
+
+def nearest_blend(share: float) -> int:
+    """Return the blend, of those that are sent, that is nearest to a share of the first viseme."""
+    return min(BLENDS, key=lambda blend: abs(blend - MOST_BLEND * share))
+
+
+def read_shapes(animation: Animation) -> tuple[Shape, ...]:
+    """Return the visemes that FAP 1 of an animation shows, each from halfway to its neighbours.
+
+    Of two visemes of a frame, the one with the larger share; it is 0 below a share of a quarter, and before
+    the first FAP 1. size: the share.
+    """
+    face = animation.face
+    if face is None:
+        return ()
+    sent = np.flatnonzero(face.mask[:, 0])
+    times = [float(animation.index[at] / animation.rate) for at in sent]
+    end = float((animation.index[-1] + 1) / animation.rate) if len(animation) else 0.0
+    borders = [0.0, *((one + two) / 2 for one, two in pairwise(times)), end]
+    shapes: list[Shape] = []
+    for at, start, stop in zip(sent, borders, borders[1:], strict=False):
+        first, second, blend, _ = (int(each) for each in face.viseme[at])
+        viseme, share = (first, blend) if blend >= MOST_BLEND - blend else (second, MOST_BLEND - blend)
+        if viseme == 0 and 4 * (MOST_BLEND - share) >= MOST_BLEND:
+            viseme, share = (second if viseme == first else first), MOST_BLEND - share
+        if shapes and shapes[-1].viseme == viseme:
+            shapes[-1] = replace(shapes[-1], end=stop)
+        else:
+            shapes.append(Shape(viseme, start, stop, share / MOST_BLEND if viseme else 1.0, 1.0))
+    return tuple(shapes)

@@ -1,0 +1,61 @@
+"""Sound in one channel at a rate: as FFmpeg reads it, and WAV files by the standard library alone."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fba.arrays import Int16
+from fba.audio.mono import read_mono
+from fba.errors import DisplayError
+
+
+def write_tone(path: Path, rate: int, channels: int, width: int = 2) -> None:
+    """Three seconds of 440 Hz, in all channels."""
+    tone = 8000 * np.sin(2 * np.pi * 440 * np.arange(3 * rate) / rate)
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(channels)
+        file.setsampwidth(width)
+        file.setframerate(rate)
+        samples = np.repeat(tone.astype("<i2"), channels).tobytes()
+        file.writeframes(samples if width == 2 else bytes(3 * rate * channels * width))
+
+
+def without_pyav(monkeypatch: pytest.MonkeyPatch) -> None:
+    there = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "av" else there(name))
+
+
+def read(path: Path) -> Int16:
+    return np.concatenate(list(read_mono(path, 16000)))
+
+
+@pytest.mark.parametrize("rate", [8000, 16000, 22050, 44100, 96000])
+@pytest.mark.parametrize("channels", [1, 2])
+@pytest.mark.parametrize("pyav", [True, False])
+def test_a_tone_stays_a_tone(
+    rate: int, channels: int, pyav: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "tone.wav"
+    write_tone(path, rate, channels)
+    if not pyav:
+        without_pyav(monkeypatch)
+    samples = read(path)
+    assert abs(len(samples) - 48000) <= 32
+    expected = 8000 * np.sin(2 * np.pi * 440 * np.arange(len(samples)) / 16000)
+    middle = slice(200, -200)
+    assert np.abs(samples[middle] - expected[middle]).max() < 400
+
+
+def test_other_files_need_pyav(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    without_pyav(monkeypatch)
+    write_tone(tmp_path / "fine.wav", 16000, 1, width=3)
+    (tmp_path / "song.mp3").write_bytes(b"ID3 and so on")
+    for name in ("fine.wav", "song.mp3"):
+        with pytest.raises(DisplayError, match=re.escape('needs PyAV: pip install "mpeg4-fba[films]"')):
+            read(tmp_path / name)

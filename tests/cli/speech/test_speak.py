@@ -1,0 +1,175 @@
+"""`fba speak` and `fba decode --visemes`: what is written, and what is said of bad input."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import shutil
+import wave
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fba
+
+Run = Callable[..., Any]
+CTM = "map 1 0.00 0.10 M\nmap 1 0.10 0.30 AE\nmap 1 0.40 0.10 P\n"
+needs_voice = pytest.mark.skipif(
+    shutil.which("flite") is None or importlib.util.find_spec("pocketsphinx") is None,
+    reason="flite and pocketsphinx are needed, and not both are installed",
+)
+needs_recogniser = pytest.mark.skipif(
+    importlib.util.find_spec("pocketsphinx") is None, reason="pocketsphinx is not installed"
+)
+
+
+@pytest.fixture
+def timings(tmp_path: Path) -> Path:
+    path = tmp_path / "map.ctm"
+    path.write_text(CTM, encoding="utf-8")
+    return path
+
+
+def write_wave(path: Path, samples: Any, rate: int = 16000, channels: int = 1, width: int = 2) -> Path:
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(channels)
+        file.setsampwidth(width)
+        file.setframerate(rate)
+        file.writeframes(samples if isinstance(samples, bytes) else np.asarray(samples, "<i2").tobytes())
+    return path
+
+
+@pytest.mark.parametrize("coding", ["visemes", "faps"])
+def test_timings_become_a_stream(coding: str, run: Run, timings: Path, tmp_path: Path) -> None:
+    done = run("speak", "--timings", timings, "--coding", coding, "--life", 0, "-o", tmp_path / "map.fba")
+    assert (done.code, done.err) == (0, "")
+    assert "map.fba: 0.50 s" in done.out
+    face = fba.read(tmp_path / "map.fba").face
+    assert face is not None
+    assert bool(face.mask[:, 0].any()) == (coding == "visemes")
+
+
+@pytest.mark.parametrize("suffix", ["json", "TextGrid"])
+def test_visemes_come_back(suffix: str, run: Run, timings: Path, tmp_path: Path) -> None:
+    stream, written = tmp_path / "map.fba", tmp_path / f"map.{suffix}"
+    run("speak", "--timings", timings, "--coding", "visemes", "-o", stream)
+    done = run("decode", stream, "--visemes", written)
+    assert done.code == 0, done.err
+    again = tmp_path / "again.fba"
+    assert run("speak", "--timings", written, "--coding", "visemes", "-o", again).code == 0
+    if suffix == "json":
+        numbers = [each["number"] for each in json.loads(written.read_text(encoding="utf-8"))["visemes"]]
+        assert [number for number in numbers if number] == [1, 10, 1]
+
+
+def test_a_stream_without_visemes_has_none_to_write(run: Run, timings: Path, tmp_path: Path) -> None:
+    run("speak", "--timings", timings, "-o", tmp_path / "map.fba")
+    done = run("decode", tmp_path / "map.fba", "--visemes", tmp_path / "map.json")
+    assert done.code == 2
+    assert "sends no visemes (FAP 1)" in done.err
+    assert not (tmp_path / "map.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "say what is spoken"),
+        (["--text", "a", "--text-file", "{ctm}"], "--text and --text-file both give the text"),
+        (["--timings", "{ctm}", "--text", "a"], "--timings says what is spoken when; leave --text out"),
+        (["--timings", "{ctm}", "--voice", "flite"], "--voice speaks a text that has no recording"),
+        (["--timings", "{ctm}", "--style", "2"], "is not in the range"),
+        (["--timings", "{ctm}", "--mood", "happy", "--coding", "visemes"], "use it with --coding faps"),
+        (["--timings", "{ctm}", "--mood", "hapy"], "did you mean 'happy'"),
+        (["--timings", "{ctm}", "--mood", "happy=lots"], "--mood: "),
+        (["--text", "hello", "-o", "-"], "give the stream a name with -o"),
+    ],
+)
+def test_mistakes_are_told(arguments: list[str], said: str, run: Run, timings: Path, tmp_path: Path) -> None:
+    given = [each.replace("{ctm}", str(timings)) for each in arguments]
+    target = [] if "-o" in given else ["-o", tmp_path / "out.fba"]
+    done = run("speak", *given, *target)
+    assert done.code == 2
+    assert said in done.err
+    assert not (tmp_path / "out.fba").exists()
+
+
+def test_a_mood_moves_the_brows(run: Run, timings: Path, tmp_path: Path) -> None:
+    target = tmp_path / "sad.fba"
+    assert run("speak", "--timings", timings, "--life", 0, "--mood", "sad=80", "-o", target).code == 0
+    face = fba.read(target).face
+    assert face is not None
+    assert face.values[:, 30].any()
+
+
+@needs_voice
+def test_a_text_is_spoken_and_its_sound_lies_beside_it(run: Run, tmp_path: Path) -> None:
+    target = tmp_path / "hello.fba"
+    done = run(
+        "speak", "--text", "Bob put five maps by the moon.", "--voice", "flite", "-o", target, "--json"
+    )
+    assert done.code == 0, done.err
+    figures = json.loads(done.out)
+    assert [word["text"] for word in figures["words"]] == ["bob", "put", "five", "maps", "by", "the", "moon"]
+    with wave.open(str(tmp_path / "hello.wav")) as sound:
+        assert sound.getnframes() / sound.getframerate() == pytest.approx(figures["seconds"], abs=0.01)
+    assert fba.read(target).duration == pytest.approx(figures["seconds"], abs=0.1)
+
+
+def test_no_voice_on_the_machine_is_told(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    done = run("speak", "--text", "hello", "-o", tmp_path / "out.fba")
+    assert done.code == 1
+    assert "install flite or espeak-ng" in done.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_recogniser
+@pytest.mark.parametrize(
+    ("name", "samples", "settings"),
+    [
+        ("silence", np.zeros(16000), {}),
+        ("stereo", np.zeros(32000), {"channels": 2}),
+        ("24 bits", bytes(3 * 96000), {"rate": 96000, "width": 3}),
+        ("telephone", np.zeros(8000), {"rate": 8000}),
+    ],
+)
+def test_silence_of_any_kind_is_a_face_at_rest(
+    name: str, samples: Any, settings: dict[str, int], run: Run, tmp_path: Path
+) -> None:
+    sound = write_wave(tmp_path / "sound.wav", samples, **settings)
+    done = run("speak", "--audio", sound, "-o", tmp_path / "out.fba")
+    assert done.code == 0, done.err
+    assert "no speech is heard in it; the face stays at rest" in done.err
+
+
+@needs_recogniser
+def test_clipped_sound_is_told(run: Run, tmp_path: Path) -> None:
+    tone = 60000 * np.sin(np.arange(32000) * 0.05) * (np.arange(32000) % 4000 > 1500)
+    sound = write_wave(tmp_path / "loud.wav", np.clip(tone, -32768, 32767))
+    done = run("speak", "--audio", sound, "-o", tmp_path / "out.fba")
+    assert done.code == 0, done.err
+    assert "clipped" in done.err or "no speech is heard" in done.err
+
+
+@needs_recogniser
+@pytest.mark.parametrize(
+    ("content", "said"), [(b"", "is empty (0 bytes)"), (b"hello there" * 99, "cannot be read as sound")]
+)
+def test_what_is_no_sound_is_refused(content: bytes, said: str, run: Run, tmp_path: Path) -> None:
+    sound = tmp_path / "sound.wav"
+    sound.write_bytes(content)
+    done = run("speak", "--audio", sound, "-o", tmp_path / "out.fba")
+    assert done.code == 1
+    assert said in done.err
+    assert not (tmp_path / "out.fba").exists()
+
+
+def test_text_files_in_other_encodings_are_refused(run: Run, tmp_path: Path) -> None:
+    text = tmp_path / "text.txt"
+    text.write_bytes(b"caf\xe9")
+    done = run("speak", "--text-file", text, "-o", tmp_path / "out.fba")
+    assert done.code == 1
+    assert "is not UTF-8 text (byte 3)" in done.err

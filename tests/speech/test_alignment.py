@@ -1,0 +1,154 @@
+"""Words and phones in sound: what flite speaks is found where flite says that it is."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.speech import SENTENCES, VOICES, add_noise, speak, start_errors, telephone, visemes
+from fba.arrays import Int16
+from fba.audio.mono import read_mono
+from fba.errors import FormatError, UnsupportedError
+from fba.speech import RATE, Phone, Prosody, find_shapes, find_speech, split_text
+from fba.speech._pieces import cut_at_pauses, measure_loudness
+
+needs_recogniser = pytest.mark.skipif(
+    importlib.util.find_spec("pocketsphinx") is None,
+    reason="pocketsphinx is not installed; it has no wheels for Python 3.14 and later",
+)
+needs_flite = pytest.mark.skipif(shutil.which("flite") is None, reason="flite is not installed")
+
+
+def spoken(voice: str, text: str, folder: Path) -> tuple[Int16, list[Phone]]:
+    phones = speak(voice, text, folder / "speech.wav")
+    return np.concatenate(list(read_mono(folder / "speech.wav", RATE))), phones
+
+
+@needs_recogniser
+@needs_flite
+def test_phones_are_found_where_they_are_spoken(tmp_path: Path) -> None:
+    """The first sentences of `bench.speech`, each of another voice; its table has all of them."""
+    starts, with_text, without = [], [], []
+    for voice, text in zip(VOICES, SENTENCES, strict=False):
+        sound, truth = spoken(voice, text, tmp_path)
+        seconds = len(sound) / RATE
+        true = visemes(find_shapes(truth), seconds)
+        found = find_speech([sound], split_text(text))
+        assert found.found is not None
+        assert found.found >= 0.7
+        assert [word.text for word in found.words] == [word.text for word in split_text(text)]
+        starts.append(start_errors(found, truth))
+        with_text.append(visemes(find_shapes(found.phones), seconds) == true)
+        without.append(visemes(find_shapes(find_speech([sound]).phones), seconds) == true)
+    assert np.mean(np.concatenate(starts) <= 0.03) >= 0.9
+    assert np.mean(np.concatenate(with_text)) >= 0.85
+    assert np.mean(np.concatenate(without)) >= 0.65
+
+
+@needs_recogniser
+@needs_flite
+def test_noise_and_telephones_do_not_stop_it(tmp_path: Path) -> None:
+    sound, truth = spoken("slt", SENTENCES[1], tmp_path)
+    true = visemes(find_shapes(truth), len(sound) / RATE)
+    for change, least in ((add_noise, 0.6), (telephone, 0.75)):
+        found = find_speech([change(sound)], split_text(SENTENCES[1]))
+        assert np.mean(visemes(find_shapes(found.phones), len(sound) / RATE) == true) > least
+
+
+@needs_recogniser
+@needs_flite
+def test_a_text_that_does_not_fit_is_refused_with_the_words_that_are_missing(tmp_path: Path) -> None:
+    sound, _ = spoken("slt", SENTENCES[0], tmp_path)
+    with pytest.raises(
+        FormatError, match=r"does not fit the sound: \d+% of its 8 words.*missing are 'yesterday'"
+    ):
+        find_speech([sound], split_text(SENTENCES[8])[:7] + split_text("indeed"))
+
+
+@needs_recogniser
+@needs_flite
+def test_long_sounds_are_aligned_in_pieces(tmp_path: Path) -> None:
+    sounds, phones, at = [], [], 0.0
+    for text in SENTENCES:
+        sound, truth = spoken("rms", text, tmp_path)
+        sounds.append(sound)
+        phones += [Phone(each.name, each.start + at, each.end + at) for each in truth]
+        at += len(sound) / RATE
+    whole = np.concatenate(sounds)
+    assert len(whole) / RATE > 26
+    times: list[float] = []
+    words = split_text(" ".join(SENTENCES))
+    found = find_speech(np.array_split(whole, 50), words, progress=times.append)
+    assert len(times) > 1
+    assert times == sorted(times)
+    assert found.found is not None
+    assert found.found > 0.8
+    assert np.mean(visemes(find_shapes(found.phones), at) == visemes(find_shapes(phones), at)) > 0.8
+
+
+@needs_recogniser
+@pytest.mark.parametrize("seconds", [0.02, 0.5, 3.0])
+def test_silence_has_no_sounds(seconds: float) -> None:
+    found = find_speech([np.zeros(round(seconds * RATE), dtype=np.int16)])
+    assert {shape.viseme for shape in find_shapes(found.phones)} == {0}
+    assert found.seconds == pytest.approx(seconds)
+
+
+@needs_recogniser
+def test_an_empty_sound_is_refused() -> None:
+    with pytest.raises(FormatError, match="the sound is empty"):
+        find_speech([])
+
+
+@needs_recogniser
+def test_words_that_nobody_pronounces_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "gruut", None)
+    with pytest.raises(UnsupportedError, match="no pronunciation is known of 'blurfnag'"):
+        find_speech([np.zeros(RATE, dtype=np.int16)], split_text("the blurfnag"))
+
+
+def test_without_the_recogniser_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pocketsphinx", None)
+    with pytest.raises(UnsupportedError, match=re.escape('pip install "mpeg4-fba[speech]"')):
+        find_speech([np.zeros(RATE, dtype=np.int16)])
+
+
+def _minutes(count: int) -> Iterator[Int16]:
+    """Noise with a pause of half a second in every ten seconds."""
+    rng = np.random.default_rng(1)
+    for _ in range(6 * count):
+        loud = rng.normal(0, 3000, round(9.5 * RATE)).astype(np.int16)
+        yield np.concatenate([loud, np.zeros(RATE // 2, dtype=np.int16)])
+
+
+def test_pieces_end_in_pauses_and_make_up_the_sound() -> None:
+    pieces = list(cut_at_pauses(_minutes(2)))
+    assert [last for *_, last in pieces] == [*[False] * (len(pieces) - 1), True]
+    assert sum(len(sound) for _, sound, _ in pieces) == 120 * RATE
+    at = 0
+    for start, sound, last in pieces:
+        assert start == at / RATE
+        at += len(sound)
+        assert len(sound) <= 26 * RATE
+        if not last:
+            assert measure_loudness(sound[-1600:]).max() == -96
+
+
+@pytest.mark.parametrize("hertz", [90, 150, 220, 330])
+def test_pitch_is_that_of_a_tone(hertz: int) -> None:
+    times = np.arange(RATE) / RATE
+    wave = sum(np.sin(2 * np.pi * hertz * part * times) / part for part in (1, 2, 3))
+    prosody = Prosody()
+    blocks = np.array_split((8000 * wave).astype(np.int16), 7)
+    assert sum(map(len, prosody.watch(blocks))) == RATE
+    loudness, pitch = prosody.mean(0.2, 0.8)
+    assert pitch == pytest.approx(12 * np.log2(hertz / 70), abs=0.5)
+    assert -16 < loudness < -10
+    assert prosody.clipped == 0

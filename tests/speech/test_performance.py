@@ -1,0 +1,176 @@
+"""Speech in streams: lips close, sounds keep their places, both codings keep their bit rates, faces live."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import fba
+from fba.arrays import Float32
+from fba.errors import OptionError
+from fba.face import resolve
+from fba.parameters import fap_numbers
+from fba.planning import encode
+from fba.speech import Coding, Phone, Speech, encoder_options, find_shapes, perform, read_shapes
+
+INNER_LIPS = [
+    fap_numbers()[name] - 1
+    for name in ("lower_t_midlip", "raise_b_midlip", "lower_t_lip_lm", "raise_b_lip_lm", "open_jaw")
+]
+PHONES = [
+    "SIL",
+    "B",
+    "AA",
+    "B",
+    "P",
+    "UH",
+    "T",
+    "F",
+    "AY",
+    "V",
+    "TH",
+    "IH",
+    "N",
+    "M",
+    "AE",
+    "P",
+    "S",
+    "B",
+    "AY",
+    "DH",
+    "AH",
+    "M",
+    "UW",
+    "N",
+    "SIL",
+]
+CODINGS: tuple[Coding, ...] = ("visemes", "faps")
+
+
+def speech(repeated: int = 1, length: float = 0.09) -> Speech:
+    """The phones one after another, of lengths that differ."""
+    rng = np.random.default_rng(3)
+    phones, at = [], 0.0
+    for name in PHONES * repeated:
+        end = at + (0.3 if name == "SIL" else length * float(rng.uniform(0.6, 1.6)))
+        phones.append(Phone(name, at, end))
+        at = end
+    return Speech(tuple(phones), (), at)
+
+
+def shown(animation: fba.Animation, times: list[float]) -> Float32:
+    """The FAPs that a player shows at times, linear between frames."""
+    assert animation.face is not None
+    faps = resolve(animation.face)
+    frames = animation.index / float(animation.rate)
+    columns = [np.interp(times, frames, column) for column in faps.T]
+    return np.stack(columns, axis=1).astype(np.float32)
+
+
+@pytest.mark.parametrize("coding", CODINGS)
+@pytest.mark.parametrize("style", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("rate", ["25", "30000/1001", "60"])
+def test_lips_are_shut_in_every_bilabial_closure(coding: Coding, style: float, rate: str) -> None:
+    said = speech(3)
+    made = perform(said, coding=coding, style=style, rate=Fraction(rate))
+    decoded = fba.decode(encode(made, encoder_options(coding)))
+    for shape in find_shapes(said.phones):
+        if shape.viseme != 1:
+            continue
+        around = np.linspace(shape.centre - 0.04, shape.centre + 0.04, 33).tolist()
+        faps = shown(decoded, around)[:, INNER_LIPS]
+        gap = -faps[:, 0] - faps[:, 1]  # inner lips apart, in MNS / 1024
+        assert gap.min() <= 40, f"the lips stay {gap.min():.0f} apart at {shape.centre:.2f} s"
+
+
+@pytest.mark.parametrize("coding", CODINGS)
+def test_lips_open_between_closures(coding: Coding) -> None:
+    said = speech()
+    decoded = fba.decode(encode(perform(said, coding=coding), encoder_options(coding)))
+    for phone in said.phones:
+        if phone.name in ("AA", "AE", "AY"):
+            around = np.linspace(phone.start, phone.end, 20).tolist()
+            assert shown(decoded, around)[:, INNER_LIPS[4]].max() > 100
+
+
+def test_rounded_vowels_push_the_lips_and_spread_ones_do_not() -> None:
+    phones = (Phone("SIL", 0, 0.2), Phone("IY", 0.2, 0.4), Phone("T", 0.4, 0.5), Phone("UW", 0.5, 0.7))
+    for coding in CODINGS:
+        faps = shown(perform(Speech(phones, (), 0.8), coding=coding, life=0), [0.3, 0.6])
+        push = faps[:, fap_numbers()["push_b_lip"] - 1]
+        stretch = faps[:, fap_numbers()["stretch_l_cornerlip"] - 1]
+        assert push[1] > push[0] + 100
+        assert stretch[0] > 50 > -50 > stretch[1]
+
+
+@pytest.mark.parametrize(("coding", "goal"), [("visemes", 200), ("faps", 500)])
+def test_streams_keep_their_bit_rates(coding: Coding, goal: int) -> None:
+    said = speech(24, 0.08)  # a minute, 12 sounds in a second
+    data = encode(perform(said, coding=coding, life=0), encoder_options(coding))
+    assert 8 * len(data) / said.seconds < goal
+
+
+def test_visemes_of_a_stream_are_those_that_were_spoken() -> None:
+    said = speech(4)
+    shapes = read_shapes(fba.decode(encode(perform(said, coding="visemes"), encoder_options("visemes"))))
+    times = np.arange(0, said.seconds, 0.01)
+    spoken, read = (
+        [next((each.viseme for each in found if each.start <= time < each.end), 0) for time in times]
+        for found in (find_shapes(said.phones), shapes)
+    )
+    assert np.mean(np.array(spoken) == np.array(read)) > 0.7
+
+
+def test_a_mumbled_mouth_moves_less() -> None:
+    said = speech()
+    moved = [np.abs(shown(perform(said, style=style, life=0), [0.5])).sum() for style in (0.0, 0.5, 1.0)]
+    assert moved[0] < moved[1] < moved[2]
+
+
+@pytest.mark.parametrize("coding", CODINGS)
+def test_life_moves_more_than_the_mouth(coding: Coding) -> None:
+    said = speech(6)
+    still, alive = (perform(said, coding=coding, life=life) for life in (0.0, 1.0))
+    numbers = fap_numbers()
+    assert still.face is not None
+    assert alive.face is not None
+    for name in ("head_pitch", "raise_l_i_eyebrow", "close_t_l_eyelid", "head_yaw"):
+        column = numbers[name] - 1
+        assert not still.face.values[:, column].any()
+        assert alive.face.values[:, column].any()
+    assert alive.face.values[:, numbers["close_t_l_eyelid"] - 1].max() == 700
+
+
+def test_eyes_blink_every_few_seconds_without_a_pause() -> None:
+    said = Speech(tuple(Phone("AA", at / 10, (at + 1) / 10) for at in range(300)), (), 30.0)
+    face = perform(said, life=1).face
+    assert face is not None
+    lids = face.values[:, fap_numbers()["close_t_l_eyelid"] - 1] == 700
+    assert 4 <= np.count_nonzero(lids[1:] & ~lids[:-1]) <= 12
+
+
+def test_silence_is_a_face_at_rest() -> None:
+    for coding in CODINGS:
+        made = perform(Speech((Phone("SIL", 0.0, 2.0),), (), 2.0), coding=coding, life=0)
+        assert not shown(made, [0.0, 1.0, 2.0]).any()
+
+
+def test_times_far_into_a_recording_are_kept() -> None:
+    """Coarticulation goes by pieces of two minutes: the same sounds look the same in each."""
+    said = speech()
+    later = tuple(Phone(each.name, each.start + 119.52, each.end + 119.52) for each in said.phones)
+    moments = [0.32, 0.48, 0.64, 1.2]
+    first = shown(perform(said, life=0), moments)
+    second = shown(
+        perform(Speech((Phone("SIL", 0, 119.52), *later), (), said.seconds + 119.52), life=0),
+        [moment + 119.52 for moment in moments],
+    )
+    assert np.abs(first - second).max() < 3  # of hundreds
+
+
+@pytest.mark.parametrize("wrong", [{"style": -0.1}, {"style": 1.1}, {"life": 2.0}, {"life": float("nan")}])
+def test_numbers_outside_of_their_range_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(OptionError, match="must be from 0 to 1"):
+        perform(speech(), **wrong)  # type: ignore[arg-type]
