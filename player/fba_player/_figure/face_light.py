@@ -30,6 +30,10 @@ FREE_LIGHT = (0.9, 0.8, 0.0, 0.3)
 """Light on a tongue that is put out: key, sky, through, rim."""
 TEETH_FILL_SHARE = 0.45
 """Share of the missing light that is added on teeth when the mouth is open."""
+UPPER_LIDS, CLOSED = (19, 20), 1024
+"""FAPs of the upper lids, and the value that closes them."""
+LIDS_REACH = 0.35
+"""Distance from the pupils, in ES0, within which light depends on the lids."""
 CLOSING_SKY = 0.45
 """Least share of the sky's light along lips and lids, where they touch."""
 ENCLOSED = 0.04
@@ -139,7 +143,7 @@ class FaceLight:
         faps = np.zeros(68, dtype=np.float32)
         still, normals = self._posed(faps)
         bare = cached_visibility(still, normals, triangles, self._sway > MIN_SWAY)
-        shut = self._lit_lines(bare)
+        shut = self._lit_lines(self._lit_lids(bare, triangles))
         if self._lips is None:
             return Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
         for fap, value in MOUTH_OPEN.items():
@@ -156,6 +160,24 @@ class FaceLight:
             for before, after in zip(shut, wide, strict=True)
         ]
         return Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
+
+    def _lit_lids(self, shut: Visibility, triangles: Int32) -> Visibility:
+        """Return visibility with that of closed eyes where more light falls on the lids then: folds open."""
+        eyes = self._model.points[[point_rows()["3.5"], point_rows()["3.6"]]]
+        if not np.isfinite(eyes).all():
+            return shut
+        faps = np.zeros(68, dtype=np.float32)
+        still = self._posed(faps)[0]
+        faps[[lid - 1 for lid in UPPER_LIDS]] = CLOSED
+        away = np.linalg.norm(still[:, None] - eyes, axis=2).min(axis=1)
+        near = away < LIDS_REACH * self._model.fapu.ES * 1024
+        closed = cached_visibility(*self._posed(faps), triangles, near)
+        more = near & (closed.open > shut.open)
+        arrays = (
+            np.where(more[:, None] if old.ndim == 2 else more, new, old)
+            for old, new in zip(shut, closed, strict=True)
+        )
+        return Visibility(*arrays)
 
     def _lit_lines(self, shut: Visibility) -> Visibility:
         """Return visibility with some light where lips and lids touch: they are flesh, not holes."""
