@@ -94,7 +94,7 @@ void main() {
     shown += spark * mix(0.55, 1.7, cornea) * vec3(1.0, 0.97, 0.93) * lit;
     shown += mix(FLOOR, SKY, mirrored.y * 0.5 + 0.5) * fresnel * (0.3 + 0.7 * shade);
     // Tears stand along the lower lid.
-    float tears = smoothstep(0.0, 0.02, above) * (1.0 - smoothstep(0.035, 0.075, above));
-    shown += vec3(0.30, 0.30, 0.31) * tears * (0.4 + 0.6 * max(dot(n, KEY_DIRECTION), 0.0));
+    float tears = smoothstep(0.0, 0.02, above) * (1.0 - smoothstep(0.02, 0.055, above));
+    shown += vec3(0.22) * tears * (0.4 + 0.6 * max(dot(n, KEY_DIRECTION), 0.0));
     pixel = vec4(encode(shown), 1.0);
 }
