@@ -159,9 +159,9 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     """Return the mesh of a tongue lying flat, and vertices of its feature points. tip: (3,), at the teeth."""
     # Down the tongue from its root to its tip, mm: z, top, half width, height.
     spine = np.array([
-        (-80, -34, 15, 24), (-68, -13, 17, 26), (-58, -4, 17.5, 24), (-48, 0.5, 17.5, 22), (-38, 2.0, 17.5, 19.5),
-        (-28, 2.2, 17, 16), (-19, 1.9, 15.4, 12.5), (-11, 1.4, 12.6, 8.6), (-5, 0.9, 9.2, 5.4),
-        (-2, 0.5, 6.6, 3.6), (-0.5, 0.25, 4.0, 2.2),
+        (-65, -34, 15, 24), (-61.5, -14, 17, 26), (-56, -4.5, 17.5, 24), (-48, 0.5, 17.5, 22),
+        (-38, 2.0, 17.5, 19.5), (-28, 2.2, 17, 16), (-19, 1.9, 15.4, 12.5), (-11, 1.4, 12.6, 8.6),
+        (-5, 0.9, 9.2, 5.4), (-2, 0.5, 6.6, 3.6), (-0.5, 0.25, 4.0, 2.2),
     ])  # fmt: skip
     from scipy.interpolate import PchipInterpolator
 

@@ -62,7 +62,7 @@ class Tongue:
     size: float
 
     def bend(self, positions: Float32, normals: Float32, faps: Float32) -> None:
-        """Move the tongue's vertices, in place, to where there is room. positions, normals: (V, 3), of all."""
+        """Move the tongue's vertices, in place, to where there is room. positions, normals: (V, 3)."""
         share = min(float(np.abs(faps[TONGUE_FAPS]).max()) / FULL_AT, 1.0)
         if share == 0.0:
             return
@@ -150,7 +150,9 @@ class Room:
         depth = np.array([inner - 0.045 * size, inner - 0.006 * size, inner, gate])
         floor = np.interp(z, depth, [low_root[1] - 0.05 * size, low_root[1], low_edge[1], low_edge[1]])
         roof = np.interp(z, depth, [top_root[1], top_root[1], top_edge[1], top_edge[1]])
-        at_lips = smoothstep((points[:, 2] + across * (lower[2] - corner[2]) - gate) / max(lower[2] - gate, 1e-4))
+        at_lips = smoothstep(
+            (points[:, 2] + across * (lower[2] - corner[2]) - gate) / max(lower[2] - gate, 1e-4)
+        )
         floor += at_lips * (lower[1] + across * (corner[1] - lower[1]) - floor)
         roof += at_lips * (upper[1] + across * (corner[1] - upper[1]) - roof)
         out = points[:, 2] > self.front + 0.001 * size
@@ -202,7 +204,9 @@ def _front_of_lip(model: FaceModel, lip: int) -> int:
     vertices = model.vertices
     unit = model.fapu.MNS * 1024
     below = vertices[lip, 1] - vertices[:, 1]
-    near: Bool = (np.abs(vertices[:, 0] - vertices[lip, 0]) < 0.1 * unit) & (below >= 0) & (below < 0.3 * unit)
+    near: Bool = (
+        (np.abs(vertices[:, 0] - vertices[lip, 0]) < 0.1 * unit) & (below >= 0) & (below < 0.3 * unit)
+    )
     for part in model.parts:
         if part.kind != "skin":
             near[part_rows(model, part.name)] = False

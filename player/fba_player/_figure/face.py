@@ -23,6 +23,7 @@ from fba_player._figure._face_parts import (
     part_rows,
     with_triangles,
 )
+from fba_player._figure._lids import follow_gaze
 from fba_player._figure._tongue import Tongue, find_tongues
 from fba_player._figure.face_light import MOUTH_OPEN, FaceLight
 from fba_player._figure.model_units import EYES_APART
@@ -120,7 +121,10 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The face for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4)."""
+    """The face shown for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4).
+
+    Lids follow the gaze, and the tongue keeps between teeth and lips.
+    """
 
     faps: Float32
     positions: Float32
@@ -179,7 +183,8 @@ class FaceFigure:
 
     def _posed(self, faps: Float32) -> Pose:
         normals = np.empty((len(self.model.vertices), 3), dtype=np.float32)
-        positions = self.deformer.local(faps, out=np.empty_like(normals), normals=normals)
+        shown = follow_gaze(faps, (ball for _, ball in self.eyeballs), self.model.fapu.IRISD)
+        positions = self.deformer.local(shown, out=np.empty_like(normals), normals=normals)
         for tongue in self.tongues:
             tongue.bend(positions, normals, faps)
         return Pose(faps, positions, normals, self.deformer.head_matrices(faps))

@@ -281,7 +281,9 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) 
     turns = slide_lid(points, np.ones(len(points)), opening, eye, lid, ways, columns=columns)
     # roots stay in the skin, which a fold or the other lid may have stopped
     _, nearest = cKDTree(marks.surface.vertices[skin.vertices]).query(shape.vertices[root])
-    at_root = slide_lid(shape.vertices[of_root], np.ones(len(points)), opening, eye, lid, ways, columns=columns)
+    at_root = slide_lid(
+        shape.vertices[of_root], np.ones(len(points)), opening, eye, lid, ways, columns=columns
+    )
     for k, at in enumerate(at_root):
         turns[k] += _shared(skin.shifts[k, nearest], pieces, hair)[shape.number[moving]] - at
     return Motion(skin.values, moving, turns)

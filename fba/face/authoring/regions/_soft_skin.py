@@ -62,8 +62,8 @@ class Region:
     points: that pull. still, contours: points and contours that stay. reach: of the motion, in ES0. share: of
     the distance to fixed vertices that moves. slack: distance in ES0 beyond which the skin does not
     overshoot. band: distance in ES0 from the line through the points of each side, within which skin moves as
-    that line does, or 0. through: depth in ES0 to which surfaces behind the skin move with it, or 0. behind: these
-    surfaces, the inside of the "mouth" or "all".
+    that line does, or 0. through: depth in ES0 to which surfaces behind the skin move with it, or 0. behind:
+    these surfaces, the inside of the "mouth" or "all".
     """
 
     name: str
@@ -168,7 +168,7 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
 
 
 def _band(marks: Landmarks, area: Region, own: list[Handle], free: Intp) -> tuple[Intp, Float64]:
-    """Return those of the free vertices that are near the line of points of their side, and their shares (M, H).
+    """Return those of the free vertices that are near the line of points of their side, and shares (M, H).
 
     Across the line the skin moves alike: a brow keeps its width.
     """
