@@ -26,7 +26,7 @@ LIPS = ("2.2", "2.3", "2.4", "2.5")
 TEETH = ("9.10", "9.11", "9.8", "9.9")
 """Edges of upper and lower teeth, their roots."""
 SLICES = 18
-"""Cross sections in which the tongue is moved up and down."""
+"""Cross sections, at most, in which the tongue is moved up and down; each has about as many vertices."""
 ADULT = 0.064
 """Distance of an adult's eyes: lengths below are in metres of such a face."""
 CLEARANCE = 0.0004
@@ -48,8 +48,8 @@ class Tongue:
     """A tongue and the vertices around it.
 
     rows: its vertices in the model. triangles: of the part. slice_of: (V,) number of each vertex's cross
-    section, and length: (V,), the same as a fraction. lips, teeth: vertices of `LIPS` and `TEETH`. front:
-    the foremost vertex of the lower lip. size: of the face, 1 for an adult's.
+    section, from the root. length: (V,), the same with fractions. lips, teeth: vertices of `LIPS` and
+    `TEETH`. front: the foremost vertex of the lower lip. size: of the face, 1 for an adult's.
     """
 
     rows: slice
@@ -86,13 +86,14 @@ class Tongue:
 
     def _level(self, points: Float64, room: Room) -> Float64:
         """Return vertices moved up or down by cross sections, so that each lies within the room."""
-        low, high = np.full(SLICES, np.inf), np.full(SLICES, -np.inf)
+        slices = int(self.slice_of.max()) + 1
+        low, high = np.full(slices, np.inf), np.full(slices, -np.inf)
         np.minimum.at(low, self.slice_of, points[:, 1])
         np.maximum.at(high, self.slice_of, points[:, 1])
-        count = np.bincount(self.slice_of, minlength=SLICES)
-        middle = np.zeros((SLICES, 3))
+        count = np.bincount(self.slice_of)
+        middle = np.zeros((slices, 3))
         for axis in (0, 2):
-            middle[:, axis] = np.bincount(self.slice_of, points[:, axis], SLICES) / count
+            middle[:, axis] = np.bincount(self.slice_of, points[:, axis]) / count
         floor, roof = room.bounds(middle)
         half = np.minimum((high - low) / 2, np.maximum(roof - floor, 0.0) / 2)
         centre = (low + high) / 2
@@ -101,7 +102,7 @@ class Tongue:
             padded = np.concatenate([shift[:1], shift, shift[-1:]])
             shift = (padded[:-2] + 2 * padded[1:-1] + padded[2:]) / 4
         moved = points.copy()
-        moved[:, 1] += np.interp(self.length, np.arange(SLICES) + 0.5, shift) - room.droop(points)
+        moved[:, 1] += np.interp(self.length, np.arange(slices) + 0.5, shift) - room.droop(points)
         return moved
 
 
@@ -189,13 +190,12 @@ def find_tongues(model: FaceModel) -> list[Tongue]:
         z = part.vertices[:, 2].astype(np.float64)
         if not len(part.triangles) or np.ptp(z) <= 0:
             continue
-        length = (z - z.min()) / np.ptp(z) * SLICES
-        number = np.minimum(length.astype(np.intp), SLICES - 1)
-        if (np.bincount(number, minlength=SLICES) == 0).any():
-            continue
+        borders = np.unique(np.quantile(z, np.linspace(0, 1, SLICES + 1)))
+        length = np.interp(z, borders, np.arange(len(borders)))
+        _, number = np.unique(np.minimum(length.astype(np.intp), len(borders) - 2), return_inverse=True)
         size = model.fapu.ES * 1024 / ADULT
         rows = part_rows(model, part.name)
-        tongues.append(Tongue(rows, part.triangles, number, length, lips, teeth, front, size))
+        tongues.append(Tongue(rows, part.triangles, number.astype(np.intp), length, lips, teeth, front, size))
     return tongues
 
 
