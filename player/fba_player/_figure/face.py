@@ -183,7 +183,8 @@ class FaceFigure:
 
     def _posed(self, faps: Float32) -> Pose:
         normals = np.empty((len(self.model.vertices), 3), dtype=np.float32)
-        shown = follow_gaze(faps, (ball for _, ball in self.eyeballs), self.model.fapu.IRISD)
+        eyes = [(ball.side, ball.radius) for _, ball in self.eyeballs]
+        shown = follow_gaze(faps, eyes, self.model.fapu.IRISD)
         positions = self.deformer.local(shown, out=np.empty_like(normals), normals=normals)
         for tongue in self.tongues:
             tongue.bend(positions, normals, faps)
