@@ -239,9 +239,11 @@ def test_lids_follow_the_gaze_unless_they_are_closed(figure: FaceFigure) -> None
     np.testing.assert_array_equal(closed[upper], looking[upper])
 
 
-def test_all_faps_keep_tongue_and_teeth_inside(marks: Landmarks, figure: FaceFigure) -> None:
+def test_faps_of_the_mouth_keep_tongue_and_teeth_inside(marks: Landmarks, figure: FaceFigure) -> None:
     edges, skin = inner_edges(figure), outer_skin(marks)
     for parameter in parameters()[2:]:
+        if parameter.group not in (2, 8):
+            continue
         for value in (-200, 200):
             positions = figure.pose(vector({parameter.number: value})).positions
             assert pierced(positions, edges, skin) == 0, (parameter.number, value)
