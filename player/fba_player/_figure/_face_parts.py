@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fba.arrays import Float32, Float64, Int32, Intp
+from fba.arrays import Bool, Float32, Float64, Int32, Intp
 from fba.errors import FbaWarning
 from fba.face import FaceModel, Part
 from fba.mesh.simplify import DetailLevels
@@ -90,10 +90,10 @@ def make_shape(part: Part, sways: Float32) -> FaceShape:
 
 
 def detail_levels(
-    part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None
+    part: Part | BodyPart, poses: Sequence[Float32], more: Float32 | None = None, kept: Bool | None = None
 ) -> DetailLevels:
     """Return the levels of detail of a part for these poses, (V, 3) each. more: (V, N), attributes to
-    preserve besides normals, colours and texture, scaled to metres."""
+    preserve besides normals, colours and texture, scaled to metres. kept: as in `DetailLevels`."""
     columns = list(poses)
     if part.normals is not None:
         columns.append(part.normals * NORMAL_WEIGHT)
@@ -104,7 +104,8 @@ def detail_levels(
         columns.append(part.colours[:, :3] * COLOUR_WEIGHT)
     if more is not None:
         columns.append(more)
-    return DetailLevels(np.concatenate(columns, axis=1).astype(np.float32), len(poses), part.triangles)
+    points = np.concatenate(columns, axis=1).astype(np.float32)
+    return DetailLevels(points, len(poses), part.triangles, kept)
 
 
 def part_rows(model: FaceModel | BodyModel, name: str) -> slice:

@@ -14,6 +14,7 @@ from fba.face import Deformer, FaceModel, Part
 from fba.face.eyeball import fit_sphere, flat_width
 from fba.geometry import fit_similarity
 from fba.parameters import FAP_COUNT, point_rows
+from fba_player._figure._closing_lines import closing_vertices
 from fba_player._figure._face_parts import (
     compute_sway,
     detail_levels,
@@ -22,6 +23,8 @@ from fba_player._figure._face_parts import (
     part_rows,
     with_triangles,
 )
+from fba_player._figure._lids import follow_gaze
+from fba_player._figure._tongue import Tongue, find_tongues
 from fba_player._figure.face_light import MOUTH_OPEN, FaceLight
 from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
@@ -118,7 +121,10 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The face for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4)."""
+    """The face shown for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4).
+
+    Lids follow the gaze, and the tongue keeps between teeth and lips.
+    """
 
     faps: Float32
     positions: Float32
@@ -141,6 +147,7 @@ class FaceFigure:
     shapes: dict[str, FaceShape]
     eyeballs: list[tuple[Part, Eyeball]]
     light: FaceLight
+    tongues: list[Tongue]
     _pose: Pose | None = field(default=None, init=False)
 
     @property
@@ -176,7 +183,11 @@ class FaceFigure:
 
     def _posed(self, faps: Float32) -> Pose:
         normals = np.empty((len(self.model.vertices), 3), dtype=np.float32)
-        positions = self.deformer.local(faps, out=np.empty_like(normals), normals=normals)
+        eyes = [(ball.side, ball.radius) for _, ball in self.eyeballs]
+        shown = follow_gaze(faps, eyes, self.model.fapu.IRISD)
+        positions = self.deformer.local(shown, out=np.empty_like(normals), normals=normals)
+        for tongue in self.tongues:
+            tongue.bend(positions, normals, faps)
         return Pose(faps, positions, normals, self.deformer.head_matrices(faps))
 
     def meshes(
@@ -250,10 +261,12 @@ def build_figure(model: FaceModel) -> FaceFigure:
         rows = part_rows(model, part.name)
         shape = replace(make_shape(part, sway[rows]), wrinkle_places=place_wrinkles(model, part))
         if shape.across is None:  # single hairs are not simplified
-            shape = replace(shape, coarser=detail_levels(part, [positions[rows] for positions in extremes]))
+            poses = [positions[rows] for positions in extremes]
+            shape = replace(shape, coarser=detail_levels(part, poses, kept=closing_vertices(model, part)))
         shapes[part.name] = shape
     light = FaceLight(model, deformer, sway)
-    return FaceFigure(model, deformer, sway, _head_centre(model), shapes, eyeballs, light)
+    tongues = find_tongues(model)
+    return FaceFigure(model, deformer, sway, _head_centre(model), shapes, eyeballs, light, tongues)
 
 
 def _extreme_positions(deformer: Deformer, faps: dict[int, int]) -> Float32:
