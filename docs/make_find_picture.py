@@ -8,7 +8,6 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-import numpy as np
 from PIL import Image
 
 import fba
@@ -18,14 +17,13 @@ from fba_player.scene.scene import Scene
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "fba/samples/hello.bvh"
-TARGET = Path(__file__).with_name("images") / "find.png"
 SIZE = 600
 FRAMES = (110, 250)
 COUNT = 6
 """Silhouettes beside each picture."""
 
 
-def main() -> None:
+def main() -> Image.Image:
     animation = fba.read(SOURCE)
     scene = Scene(animation)
     scene.show("background", "transparent")
@@ -45,8 +43,4 @@ def main() -> None:
     for row, photograph in enumerate(photographs):
         small = photograph.resize((height, height), Image.Resampling.LANCZOS)
         page.paste(small, (0, row * height), small)
-    Image.fromarray(np.asarray(page)).save(TARGET, optimize=True)
-
-
-if __name__ == "__main__":
-    main()
+    return page

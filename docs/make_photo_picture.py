@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from fba import Animation, FaceTrack, player
+from fba.arrays import UInt8
 from fba.errors import FbaWarning
 from fba.face import FaceModel, fitting
 from fba.parameters import point_rows
@@ -39,15 +38,11 @@ def photograph(head: FaceModel, name: str) -> fitting.Photo:
     return fitting.Photo(fitting.Photograph(np.ascontiguousarray(pixels), SIZE, f"{name}.png"), points)
 
 
-def main(target: Path) -> None:
+def main() -> UInt8:
     head = varied_head(np.random.default_rng(SEED))
     assert head is not None
     photos = [photograph(head, name) for name in TURNS]
     steps = [*fitting.find_front_points(photos[0].photograph).steps]
     steps += fitting.find_side_points(photos[1].photograph).steps
     made = fitting.head_from_photos(*photos)
-    Image.fromarray(photo_sheet(photos, made, steps)).save(target, quality=88)
-
-
-if __name__ == "__main__":
-    main(Path(__file__).parent / "images/photos.jpg")
+    return photo_sheet(photos, made, steps)

@@ -16,6 +16,7 @@ from fba.arrays import Bool, Float32, Float64, Int32, Int64, UInt8
 from fba.body import BodyModel
 from fba.errors import FbaError, LimitError
 from fba.face import FaceModel
+from fba.limits import DEFAULT_LIMITS, Limits
 from fba.outlines._distance import project
 from fba.outlines._figure import Figure, read_poses
 from fba.outlines._index_file import Stored, Stream, pack_mask, read_index, unpack_mask, write_index
@@ -85,9 +86,12 @@ class Index:
         self.stored = stored
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Index:
-        """Read an index. Raises FormatError for another kind of file, a damaged or a contradictory one."""
-        return cls(read_index(path))
+    def load(cls, path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LIMITS) -> Index:
+        """Read an index.
+
+        Raises FormatError for another kind of file, a damaged or a contradictory one; LimitError.
+        """
+        return cls(read_index(path, limits))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the index, whole or not at all. Raises FormatError where that fails."""

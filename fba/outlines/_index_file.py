@@ -15,6 +15,7 @@ import numpy as np
 from fba.arrays import Bool, Float32, Int32, Int64, UInt8
 from fba.atomic import atomic
 from fba.errors import FormatError
+from fba.limits import Limits
 from fba.outlines._mask import SIDE
 from fba.outlines._methods import SAMPLES
 from fba.outlines._raster import View
@@ -27,8 +28,6 @@ REMEDY = "`fba find --build` makes one"
 FORMAT, VERSION = "fba-outlines", 1
 CANVAS = SIDE + 4
 """Pixels of the sides of a stored silhouette."""
-MOST_BYTES = 1 << 30
-"""Largest array of a file that is read, in bytes."""
 MOST_ROWS = 1 << 22
 
 
@@ -107,12 +106,15 @@ def write_index(path: str | os.PathLike[str], stored: Stored) -> None:
         np.savez_compressed(file, about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8), **arrays)
 
 
-def read_index(path: str | os.PathLike[str]) -> Stored:
-    """Return an index. Raises FormatError for another kind of file, a damaged or a contradictory one."""
-    file, _ = open_source(path)
+def read_index(path: str | os.PathLike[str], limits: Limits) -> Stored:
+    """Return an index. Raises FormatError for another kind of file, a damaged or a contradictory one;
+    LimitError for arrays that take too much memory for the size of the file."""
+    file, size = open_source(path)
     with file:
         try:
             with zipfile.ZipFile(file) as archive:
+                count = sum(entry.file_size for entry in archive.infolist())
+                limits.check_bytes(count, f"{path}: an index", source=size)
                 about = _read_about(_read_array(archive, "about", path).tobytes(), path)
                 arrays = {name: _read_array(archive, name, path) for name in LAYOUT}
         except DAMAGE as error:
@@ -128,17 +130,13 @@ def read_index(path: str | os.PathLike[str]) -> Stored:
 
 
 def _read_array(archive: zipfile.ZipFile, name: str, path: str | os.PathLike[str]) -> Any:
-    """Return an array of the file. No more memory is taken than the file says, or than is allowed."""
+    """Return an array of the file, which takes the memory that the archive's list says."""
     try:
         entry = archive.getinfo(f"{name}.npy")
     except KeyError:
         raise FormatError(
             f"is not an index of outlines: it has no array {name!r}; {REMEDY}", path=path
         ) from None
-    if entry.file_size > MOST_BYTES:
-        raise FormatError(
-            f"its array {name!r} has {entry.file_size} bytes, more than {MOST_BYTES}", path=path
-        )
     with archive.open(entry) as member:
         try:
             if np.lib.format.read_magic(member) != (1, 0):
@@ -146,7 +144,7 @@ def _read_array(archive: zipfile.ZipFile, name: str, path: str | os.PathLike[str
             shape, fortran, dtype = np.lib.format.read_array_header_1_0(member)
             if fortran or dtype.hasobject or not all(0 <= side <= MOST_ROWS for side in shape):
                 raise ValueError(f"its header says {shape}, {dtype}")
-            data = member.read(MOST_BYTES + 1)
+            data = member.read()
             if len(data) != dtype.itemsize * int(np.prod(shape, dtype=object)):
                 raise ValueError(f"it has {len(data)} bytes, but its header says {shape}, {dtype}")
             return np.frombuffer(data, dtype=dtype).reshape(shape)

@@ -346,7 +346,13 @@ def alike(one: bytes, other: bytes) -> bool:
 
 def read_arrays(data: bytes) -> dict[str, np.ndarray]:
     found = np.load(io.BytesIO(data))
-    return {"": found} if isinstance(found, np.ndarray) else dict(found)
+    if isinstance(found, np.ndarray):
+        return {"": found}
+    # What is no array in an archive is there as its bytes.
+    return {
+        name: np.frombuffer(part, np.uint8) if isinstance(part, bytes) else part
+        for name, part in found.items()
+    }
 
 
 def alike_arrays(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> bool:

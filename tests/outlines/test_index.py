@@ -16,6 +16,7 @@ import pytest
 from fba.body import BodyModel
 from fba.errors import FbaError, FormatError, LimitError
 from fba.face import FaceModel
+from fba.limits import Limits
 from fba.outlines import Choice, Figure, Index, View, build_index, draw_sheet, draw_silhouette
 from fba.outlines._figure import read_poses
 from outlined import nodding, raising
@@ -202,6 +203,16 @@ def test_a_header_that_promises_too_much(index: Index, tmp_path: Path) -> None:
         (tmp_path / "bomb.npz").write_bytes(target.getvalue())
         with pytest.raises(FormatError, match="'baps' is damaged"):
             Index.load(tmp_path / "bomb.npz")
+
+
+def test_an_archive_that_swells(index: Index, tmp_path: Path) -> None:
+    path = tmp_path / "index.npz"
+    index.save(path)
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("more.npy", bytes(200_000_000))
+    with pytest.raises(LimitError, match=r"index.npz: an index takes \d+ bytes"):
+        Index.load(path)
+    assert len(Index.load(path, limits=Limits(bytes=300_000_000))) == len(index)
 
 
 def test_files_that_are_damaged_anywhere(index: Index, tmp_path: Path) -> None:

@@ -209,17 +209,22 @@ def _triangle_map(corners: Float64, shape: tuple[int, int]) -> Int32:
 
 def _texels(surface: _Surface, corner: Int32) -> Iterator[tuple[slice, Float64, Float64]]:
     """Yield rows of the texture with the places and normals of its texels on the skin, each (R, W, 3)."""
-    texcoords = surface.texcoords * SIZE - 0.5
-    for start in range(0, SIZE, ROWS):
-        rows = slice(start, start + ROWS)
-        triangles = surface.triangles[np.maximum(corner[rows], 0)]
-        y, x = np.mgrid[start : start + ROWS, 0:SIZE].astype(np.float64)
-        shares = _shares(texcoords[triangles], np.stack([x, y], axis=-1))
+    for rows, triangles, shares in _corners_of_texels(surface, corner):
         places = np.einsum("rck,rckd->rcd", shares, surface.vertices[triangles])
         normals = np.einsum("rck,rckd->rcd", shares, surface.normals[triangles])
         normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
         normals[corner[rows] < 0] = 0.0
         yield rows, places, normals
+
+
+def _corners_of_texels(surface: _Surface, corner: Int32) -> Iterator[tuple[slice, Int32, Float64]]:
+    """Yield rows of the texture with the vertices around each texel and their shares, each (R, W, 3)."""
+    texcoords = surface.texcoords * SIZE - 0.5
+    for start in range(0, SIZE, ROWS):
+        rows = slice(start, start + ROWS)
+        triangles = surface.triangles[np.maximum(corner[rows], 0)]
+        y, x = np.mgrid[start : start + ROWS, 0:SIZE].astype(np.float64)
+        yield rows, triangles, _shares(texcoords[triangles], np.stack([x, y], axis=-1))
 
 
 def _shares(corners: Float64, at: Float64) -> Float64:
@@ -245,12 +250,7 @@ def _own_skin(part: Part, surface: _Surface, corner: Int32) -> Float32:
         image = Image.fromarray(pixels[..., :3]).resize((SIZE, SIZE))
         plain = _to_linear(np.asarray(image, dtype=np.float32) / 255)
     if part.colours is not None:
-        texcoords = surface.texcoords * SIZE - 0.5
-        for start in range(0, SIZE, ROWS):
-            rows = slice(start, start + ROWS)
-            triangles = surface.triangles[np.maximum(corner[rows], 0)]
-            y, x = np.mgrid[start : start + ROWS, 0:SIZE].astype(np.float64)
-            shares = _shares(texcoords[triangles], np.stack([x, y], axis=-1))
+        for rows, triangles, shares in _corners_of_texels(surface, corner):
             plain[rows] *= np.einsum("rck,rckd->rcd", shares, part.colours[triangles, :3])
     return plain
 

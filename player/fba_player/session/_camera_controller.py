@@ -159,11 +159,15 @@ class Viewpoint:
         """What a camera without the name of its view has to follow to do as this one does."""
         return "head" if self.follow is None and self._of_head else self.follow
 
-    def command(self) -> str:
-        """Return the options of `fba play` and `fba render` that give this view."""
-        turned = self.camera.orbit(self._turned(), 0.0)
-        parts = [f"--camera {turned.text}", f"--follow {self.following}" if self.following else ""]
-        return " ".join(filter(None, [*parts, f"--orbit {self.scene.orbit:g}" if self.scene.orbit else ""]))
+    def options(self) -> dict[str, str]:
+        """Return the options of `fba play` and `fba render` that give this view, by their names."""
+        orbit = f"{self.scene.orbit:g}" if self.scene.orbit else ""
+        given = {
+            "camera": self.camera.orbit(self._turned(), 0.0).text,
+            "follow": self.following or "",
+            "orbit": orbit,
+        }
+        return {name: value for name, value in given.items() if value}
 
     def camera_for_export(self, aspect: float) -> Camera:
         """Return the camera for pictures of another shape: a view that was not moved is fitted."""

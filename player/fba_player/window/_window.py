@@ -356,8 +356,9 @@ class Window(Closing):
         """Put the command that draws this picture onto the clipboard, and show it."""
         session, time = self.session, self.transport.time
         name = os.path.abspath(session.source.path) if session.source.path is not None else "FILE"
-        view = session.viewpoint.command()
-        text = f"fba render {shlex.quote(name)} -o picture.png --time {time:.3f} {view}"
+        options = {"time": f"{time:.3f}", **session.viewpoint.options()}
+        given = " ".join(f"--{option} {value}" for option, value in options.items())
+        text = f"fba render {shlex.quote(name)} -o picture.png {given}"
         self._glfw.set_clipboard_string(self._window, text)
         session.say(f"Copied: {text}", seconds=8.0, about="command")
 

@@ -38,7 +38,7 @@ INSTEAD: dict[Subject, str] = {
     ),
     "photos": (
         'Without a window, write the file by hand: {"front": {"points": {"3.5": [x, y], ...}}}, in pixels '
-        "from the top left of the picture, and give it with --points"
+        "from the top left of the picture, and run `fba model photos FRONT --points FILE`"
     ),
 }
 """What to do where no window can be opened."""

@@ -86,8 +86,8 @@ def test_it_turns_around_the_figure_and_stays_where_it_is(clock: Clock) -> None:
     assert viewpoint.camera_at(0.0).yaw == pytest.approx(10)
     clock.now += ORBIT_SECONDS / 4
     assert viewpoint.camera_at(0.0).yaw == pytest.approx(100)
-    assert "turn=100," in viewpoint.command()
-    assert viewpoint.command().endswith(f"--orbit {ORBIT_SECONDS:g}")
+    assert "turn=100," in viewpoint.options()["camera"]
+    assert viewpoint.options()["orbit"] == f"{ORBIT_SECONDS:g}"
     viewpoint.toggle_orbit()
     clock.now += 3.0
     assert not viewpoint.gliding
@@ -104,7 +104,7 @@ def test_a_view_of_the_face_follows_the_head(walking: Animation, clock: Clock) -
     clock.now += GLIDE_SECONDS
     moved = np.subtract(viewpoint.camera_at(0.2).target, scene.camera("face", 1.5).target)
     np.testing.assert_allclose(moved, scene.head_travel(0.2), atol=1e-9)
-    assert "--follow head" in viewpoint.command()
+    assert viewpoint.options()["follow"] == "head"
 
 
 def test_a_view_fits_again_where_the_bar_is_hidden(talking: Animation, clock: Clock) -> None:

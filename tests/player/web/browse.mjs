@@ -71,16 +71,22 @@ async function press(parts, key) {
   return null;
 }
 
+/** Wait until the page has handled the input before: Firefox hands it on later than it answers. */
+async function settle() {
+  await page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(null))))");
+  return null;
+}
+
 async function take(step) {
   if (step.wait) return until(step.wait);
   if (step.run) return page.evaluate(step.run);
-  if (step.key) return press(step.key.split("+").filter(Boolean), step.key);
+  if (step.key) return press(step.key.split("+").filter(Boolean), step.key).then(settle);
   if (step.size) return kind === "firefox" ? page.setViewport({ width: step.size[0], height: step.size[1] }) : page.setViewportSize({ width: step.size[0], height: step.size[1] });
   if (step.shot) return page.screenshot({ path: step.shot }).then(() => null);
   if (step.click) {
     const [left, top, width, height] = await placeOf(step.click);
     await page.mouse.click(left + width * (step.at ?? 0.5), top + height / 2);
-    return null;
+    return settle();
   }
   const [left, top, width, height] = await placeOf(".stage canvas");
   if (step.wheel) {
@@ -94,5 +100,5 @@ async function take(step) {
   await page.mouse.down();
   await page.mouse.move(left + width * to[0], top + height * to[1], { steps: 5 });
   await page.mouse.up();
-  return null;
+  return settle();
 }

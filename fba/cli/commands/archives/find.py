@@ -176,7 +176,7 @@ def _find(
             Output(name, target) if drawn else Output.of_format(name, target, find_writer(target, None))
         ]
     outputs = Outputs(listed, [*pictures, file], no_clobber=no_clobber)
-    index = Index.load(file)
+    index = Index.load(file, limits=reading.limit)
     masks = [read_mask(picture, limits=reading.limit) for picture in pictures]
     found = [index.search(mask, finding.count) for mask in masks]
     chosen = [hits[0] for hits in found]
