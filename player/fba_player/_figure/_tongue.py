@@ -47,11 +47,12 @@ DROOP = 6.0
 class Tongue:
     """A tongue and the vertices around it.
 
-    rows: its vertices in the model. triangles: of the part. slice_of: (V,) number of each vertex's cross
-    section, from the root. length: (V,), the same with fractions. lips, teeth: vertices of `LIPS` and
-    `TEETH`. front: the foremost vertex of the lower lip. size: of the face, 1 for an adult's.
+    part: its name. rows: its vertices in the model. triangles: of the part. slice_of: (V,) number of each
+    vertex's cross section, from the root. length: (V,), the same with fractions. lips, teeth: vertices of
+    `LIPS` and `TEETH`. front: the foremost vertex of the lower lip. size: of the face, 1 for an adult's.
     """
 
+    part: str
     rows: slice
     triangles: Int32
     slice_of: Intp
@@ -78,7 +79,7 @@ class Tongue:
         upper, lower, left, right = positions[self.lips]
         return Room(
             (upper, lower, (left + right) / 2),
-            abs(float(left[0] - right[0])) / 2,
+            max(abs(float(left[0] - right[0])) / 2, 1e-6),
             tuple(positions[self.teeth]),
             float(positions[self.front, 2]),
             self.size,
@@ -195,7 +196,8 @@ def find_tongues(model: FaceModel) -> list[Tongue]:
         _, number = np.unique(np.minimum(length.astype(np.intp), len(borders) - 2), return_inverse=True)
         size = model.fapu.ES * 1024 / ADULT
         rows = part_rows(model, part.name)
-        tongues.append(Tongue(rows, part.triangles, number.astype(np.intp), length, lips, teeth, front, size))
+        slice_of = number.astype(np.intp)
+        tongues.append(Tongue(part.name, rows, part.triangles, slice_of, length, lips, teeth, front, size))
     return tongues
 
 
