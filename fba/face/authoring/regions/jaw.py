@@ -50,7 +50,7 @@ class Tuning:
     cheek_margin: float = 0.4
     one_jaw_margin: float = 0.15  # teeth with half plus this share on one side of their edge are one jaw's
     lip_depth: float = 0.16  # distance from the lips beyond which the mouth moves as the jaws do, in ES0
-    root: float = 0.15  # share of the tongue's length that stays in the throat, thrust out or rolled
+    root: float = 0.15  # share of the tongue's length that stays in the throat
     tip_bend: float = 2.0  # power of the length with which the motion falls off to the root: it bends
     roll_steps: int = 8  # number of values at which the roll is computed
 
@@ -263,6 +263,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
     root = float(points[:, 2].min())
     if tip[2] - root <= 0:
         return "the tongue's tip (6.1) is not before its root"
+    root += TUNING.root * float(tip[2] - root)
     length = np.clip((points[:, 2] - root) / (tip[2] - root), 0.0, 1.0)
     if fap == 46:
         middle = (marks.point("6.2")[2] - root) / (tip[2] - root)
@@ -272,7 +273,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
             length < middle, smoothstep(length / middle), smoothstep((1 - length) / (1 - middle))
         )
     elif fap == 45:
-        share = np.maximum(length - TUNING.root, 0.0) / (1 - TUNING.root)
+        share = length
     else:
         share = length**TUNING.tip_bend
     field = share[:, None] * marks.step(fap)
