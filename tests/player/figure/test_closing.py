@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from scipy.spatial import cKDTree
 
+import fba
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Bool, Float32, Float64, Intp
-from fba.face import Deformer
+from fba.face import Deformer, resolve
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.model import FaceModel
 from fba.parameters import faps as parameters
@@ -36,6 +38,9 @@ OPEN = {
     58: -500,
 }
 """FAPs of jaw and lips: a mouth that is open."""
+SAMPLES = Path(fba.__file__).parent / "samples"
+SEEN = 12
+"""Frames of a stream that are looked at."""
 TONGUE = (43, 44, 45, 46)
 BRIGHT = 3000.0
 
@@ -237,6 +242,25 @@ def test_lids_follow_the_gaze_unless_they_are_closed(figure: FaceFigure) -> None
     shut = {19: 1024, 20: 1024}
     closed, looking = (figure.pose(vector({**shut, 25: way})).positions for way in (0, 25000))
     np.testing.assert_array_equal(closed[upper], looking[upper])
+
+
+@pytest.mark.parametrize("number", [16, 17])
+def test_lips_pushed_back_stop_before_the_teeth(marks: Landmarks, figure: FaceFigure, number: int) -> None:
+    edges, skin = inner_edges(figure), outer_skin(marks)
+    for value in (-1080, -450):
+        assert pierced(figure.pose(vector({number: value})).positions, edges, skin) == 0, value
+
+
+@pytest.mark.parametrize("sample", ["hello.fap"])
+def test_frames_of_a_stream_keep_tongue_and_teeth_inside(
+    marks: Landmarks, figure: FaceFigure, sample: str
+) -> None:
+    edges, skin = inner_edges(figure), outer_skin(marks)
+    animation = fba.read(SAMPLES / sample)
+    assert animation.face is not None
+    frames = resolve(animation.face, figure.model)
+    for frame in np.random.default_rng(30).choice(len(frames), SEEN, replace=False):
+        assert pierced(figure.pose(frames[frame].astype(np.float32)).positions, edges, skin) == 0, frame
 
 
 def test_faps_of_the_mouth_keep_tongue_and_teeth_inside(marks: Landmarks, figure: FaceFigure) -> None:
