@@ -41,6 +41,7 @@ PICTURES = {
     "gait.jpg": "make_gait_pictures.main",
     "gait_curves.svg": "make_gait_curves.main",
     "hello.png": "make_head_pictures.hello",
+    "lanes.jpg": "make_player_pictures.lanes",
     "loss.svg": "make_loss_picture.main",
     "markers-page.jpg": "make_player_pictures.markers",
     "moods.jpg": "make_mood_picture.moods",

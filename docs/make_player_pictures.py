@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
+import wave
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 from make_marker_picture import edit
 
 import fba
 from fba.animation import Animation
 from fba.arrays import UInt8
-from fba.face import FaceModel, feature_point_names
+from fba.face import FaceModel, feature_point_names, resolve
 from fba.face.importers.head_surface import read_head_surface
 from fba.formats import merge, read_face
+from fba.tracks import FaceTrack
 from fba_player._ui.panels.puppet_panel import PuppetPanel
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement
@@ -24,6 +28,7 @@ from fba_player.scene.scene import Scene
 from fba_player.session._puppet import Expression
 from fba_player.session._session import Session
 from fba_player.session._source import Source
+from fba_player.sound._peaks import Peaks
 from tools.window_picture import SETTLES, Studio, picture
 
 SAMPLES = Path(fba.__file__).resolve().with_name("samples")
@@ -33,6 +38,10 @@ MOMENT, MARKS = 4.4, (2.0, 6.6)
 COARSE = 31
 """Quantiser step of what is compared."""
 CURVES = [3, 49, 31]
+SPOKEN = (6, 10, 9, 5, 11, 0, 12, 4, 0, 7, 3, 13, 2, 1, 14, 0)
+"""Visemes by number, one after the other."""
+VISEME_SECONDS, SPOKEN_MOMENT = 0.24, 3.1
+"""Seconds of each, and the moment that is shown."""
 MOVED = {3: 420.0, 15: -120.0}
 """FAPs whose curves are shown, and those moved by hand."""
 
@@ -73,6 +82,57 @@ def compare() -> UInt8:
     session.transport.seek(MOMENT)
     with Studio(session) as studio:
         return studio.draw(2 * SETTLES)
+
+
+def lanes() -> UInt8:
+    """A stream of visemes and expressions with a sound, all made by hand, and curves that follow from it."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        animation = _speech()
+        fba.write("speech.fba", animation)
+        sound = _sound_of(animation, Path("speech.wav"))
+        session = Session(
+            Scene(fba.read("speech.fba")), source=Source(Scene(animation), "speech.fba"), size=SIZE
+        )
+        session.source.probe(wait=True)
+        session.sound, session.lanes = sound, "all"
+        session.transport.seek(SPOKEN_MOMENT)
+        session.selection.choose([("measure", 1), ("viseme", 10), ("expression", 1)])
+        with Peaks(sound) as session.peaks:
+            session.peaks.start(wait=True)
+            return picture(session, ("curves",))
+
+
+def _speech() -> Animation:
+    """Return visemes that pass into each other, with joy and surprise: eight seconds."""
+    times = np.arange(8 * 25) / 25
+    step, share = np.divmod(times, VISEME_SECONDS)
+    spoken = np.array((*SPOKEN, *SPOKEN[:1]), np.int16)
+    viseme, expression = np.zeros((len(times), 4), np.int16), np.zeros((len(times), 6), np.int16)
+    at = step.astype(int) % len(SPOKEN)
+    viseme[:, 0], viseme[:, 1] = spoken[at], spoken[at + 1]
+    viseme[:, 2] = np.round(63 * (1 - share / VISEME_SECONDS))
+    expression[:, 0], expression[:, 1] = 1, np.round(40 * np.sin(np.pi * times / 8) ** 2)
+    expression[:, 2], expression[:, 3] = 6, np.round(50 * np.exp(-((times - 6) ** 2) * 2))
+    mask = np.zeros((len(times), 68), bool)
+    mask[:, :2] = True
+    face = FaceTrack(np.zeros(mask.shape, np.int32), mask, viseme, expression)
+    return Animation(Fraction(25), np.arange(len(times)), face, None, "speech")
+
+
+def _sound_of(animation: Animation, path: Path) -> Path:
+    """Write a tone that is loud while the mouth is open."""
+    assert animation.face is not None
+    rate = 16000
+    jaw = np.abs(resolve(animation.face)[:, 2])
+    times = np.arange(8 * rate) / rate
+    loud = np.interp(times, animation.times, jaw / max(float(jaw.max()), 1.0))
+    tone = np.sin(2 * np.pi * 140 * times) * loud * 20000
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(rate)
+        file.writeframes(tone.astype("<i2").tobytes())
+    return path
 
 
 def points() -> UInt8:

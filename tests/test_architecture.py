@@ -285,11 +285,10 @@ def test_modules_that_no_other_room_uses_are_private() -> None:
     }
     files = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").rglob("*.py")]
     pages = "\n".join(path.read_text(encoding="utf-8") for path in files)
-    named = {
-        module
-        for module in modules()
-        if re.search(rf"(?<![\w.]){re.escape(module)}(?!\w)", pages) is not None
-    }
+    named: set[str] = set()
+    for name in re.findall(r"(?<![\w.])fba\w*(?:\.\w+)+", pages):
+        parts = name.split(".")
+        named |= {".".join(parts[:end]) for end in range(1, len(parts) + 1)}
     public = [
         module
         for module in modules()

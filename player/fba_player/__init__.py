@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from fba_player.view._camera import Camera, Subject
     from fba_player.window._display import check_display
     from fba_player.window._play import play
+    from fba_player.window.surface import Surface
 
 _NAMES = {
     "export.contact_sheet": ("contact_sheet",),
@@ -48,6 +49,7 @@ _NAMES = {
     "view._camera": ("Camera", "Subject"),
     "window._display": ("check_display",),
     "window._play": ("play",),
+    "window.surface": ("Surface",),
 }
 """Public names by the module that they are imported from, on first use."""
 
@@ -65,6 +67,7 @@ __all__ = [
     "Renderer",
     "Scene",
     "Subject",
+    "Surface",
     "TakeRecorder",
     "Timeline",
     "Transport",

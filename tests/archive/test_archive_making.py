@@ -93,6 +93,7 @@ def test_streams_are_encoded_again_where_asked(takes: Path, tmp_path: Path) -> N
     assert (both.decode().face, both.decode().body) == (whole.face, whole.body)
 
 
+@pytest.mark.slow
 def test_smaller_within_a_tolerance(tmp_path: Path) -> None:
     fba.write(tmp_path / "talk.fap", archived.performance(1, frames=40))
     sizes = []
@@ -258,6 +259,7 @@ def work(item: int) -> int:
     return item * item
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_takes_its_item_alone() -> None:
     outcomes = list(for_each(work, range(20), jobs=2, chunk=4))
     assert [one.item for one in outcomes] == list(range(20))  # nothing lost, nothing twice

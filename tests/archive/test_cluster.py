@@ -97,6 +97,7 @@ def note(item: tuple[str, int]) -> int:
     return number * number
 
 
+@pytest.mark.slow
 def test_workers_that_end_lose_nothing(tmp_path: Path) -> None:
     items = [(str(tmp_path), number) for number in range(40)]
     with started(2, tmp_path) as (address, _, workers):

@@ -266,6 +266,7 @@ def test_foreign_vectors(shared: Path) -> None:
     assert (real, missed) == (24, ["real/perfumist_basicMotion.fba"])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*the header says 908 frames")
 def test_captures(shared: Path) -> None:
     for path in sorted((shared / "data").glob("*/*.bvh")):

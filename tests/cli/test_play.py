@@ -31,11 +31,13 @@ class Window:
         self.meanwhile: Callable[[Any], None] = lambda scene: None
         self.dropped: list[tuple[Path, ...]] = []
         self.titles: list[str] = []
+        self.surfaces: list[Any] = []
 
     def __call__(self, scene: Any, **options: Any) -> tuple[Path, ...]:
-        self.scene, self.options = scene, options
+        self.scene, self.options = scene(), options
+        self.surfaces.append(options.pop("surface"))
         self.titles.append(options["title"])
-        self.meanwhile(scene)
+        self.meanwhile(self.scene)
         return self.dropped.pop(0) if self.dropped else ()
 
 
@@ -78,7 +80,7 @@ def test_a_file_is_played(run: Run, window: Window, talk: Path) -> None:
     assert window.options == {
         "title": "talk.fba", "size": (1280, 720), "camera": None, "loop": False, "speed": 1.0, "start": None,
         "paused": False, "interpolate": True, "audio": None, "audio_offset": 0.0, "file": talk,
-        "bap_steps": "iso", "warnings": (), "panels": (),
+        "bap_steps": "iso", "warnings": (), "panels": (), "life": False,
     }  # fmt: skip
 
 
@@ -129,6 +131,7 @@ def test_dropped_files_are_played_next(run: Run, window: Window, talk: Path, tmp
     assert (window.options["speed"], window.options["start"]) == (2.0, None)
     assert window.options["audio"] == tmp_path / "other.wav"
     assert isinstance(window.scene, CompareScene)
+    assert len(set(map(id, window.surfaces))) == 1  # all in the same window
 
 
 def test_files_of_the_same_name_are_told_apart(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, dict[str, Any]]]:
     """What windows were to show, and how."""
     found: list[tuple[Any, dict[str, Any]]] = []
     monkeypatch.setattr(player, "check_display", lambda: None)
-    monkeypatch.setattr(player, "play", lambda scene, **options: found.append((scene, options)))
+    monkeypatch.setattr(player, "play", lambda build, **options: found.append((build(), options)))
     return found
 
 

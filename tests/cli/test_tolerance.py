@@ -146,6 +146,7 @@ def test_the_report_of_a_body_tolerance(run: Run, gesture: Path, tmp_path: Path)
     assert "--bap-quant and --body-tolerance contradict each other" in " ".join(done.err.split())
 
 
+@pytest.mark.slow
 def test_a_capture_is_compared_with_the_frames_that_players_fill_in(run: Run, tmp_path: Path) -> None:
     lines = (Path(fba.__file__).parent / "samples" / "hello.bvh").read_text().splitlines()
     first = lines.index("MOTION") + 3

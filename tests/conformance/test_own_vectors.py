@@ -69,6 +69,7 @@ def test_every_vector_passes() -> None:
     assert sum(result.encoded is True for result in results) >= 100
 
 
+@pytest.mark.slow
 def test_every_point_of_the_syntax_and_every_branch_of_the_decoder_is_reached() -> None:
     found = coverage.reached(VECTORS)
     assert coverage.gaps(found) == []

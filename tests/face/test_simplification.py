@@ -19,7 +19,10 @@ from fba.mesh.simplify import simplify
 from fba.parameters import FAP_COUNT
 from small_face import small_face
 
-pytestmark = pytest.mark.skipif(not is_compiled(), reason="too slow without numba")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not is_compiled(), reason="too slow without numba"),
+]
 SOURCE_STAGES = (2141, 1929, 1307, 680)
 
 

@@ -251,6 +251,7 @@ def test_statistics_come_back_from_a_file(persona: Persona, tmp_path: Path) -> N
     assert Persona.load(tmp_path / "old.persona").motions is None
 
 
+@pytest.mark.slow
 def test_moods_differ_in_motion_and_keep_the_difference_when_played() -> None:
     """The table of docs/persona.md with fewer takes: 90 % is the goal, a third is chance."""
     rows = blind_test.made_up(takes=7, learnt=5, user_takes=2, means=("motion",))

@@ -31,12 +31,17 @@ def make_tables() -> str:
     i_max, i_min, p_max, p_min = (limits[which, BAPS][:BAP_STANDARD_COUNT] for which in range(4))
     assert np.array_equal(p_max, p_min)
     assert all((bap_steps(name)[BAP_STANDARD_COUNT:] == 1).all() for name in BAP_STEP_TABLES)
-    standard = {name: bap_steps(name)[:BAP_STANDARD_COUNT] for name in BAP_STEP_TABLES}
     faps = fap_steps()[2:]
-    steps = sorted({int(step) for table in (faps, *standard.values()) for step in table})
-    bap_tables = ",\n".join(
-        f"  {name}: {_digits(map(steps.index, table.tolist()))}" for name, table in standard.items()
-    )
+    iso, visage = (bap_steps(name)[:BAP_STANDARD_COUNT] for name in ("iso", "visage"))
+    steps = sorted({0, *faps.tolist(), *iso.tolist(), *visage.tolist()})
+    iso_places, visage_places = (_digits(map(steps.index, table.tolist())) for table in (iso, visage))
+    replaced = f"{steps.index(64)}{steps.index(128)}"
+    common = str(steps.index(170))
+    last = visage_places[-7:-1]
+    derived = iso_places[1:-7].translate(str.maketrans(replaced, common * 2)) + last
+    assert visage_places[1:-1] == derived
+    face_steps = _face("0010101", _digits(map(steps.index, faps.tolist())))
+    face_limits = [_face("0" * 7, _digits(limits[which, FAPS])) for which in (0, 2)]
     return "\n".join(
         [
             "/** Tables of ISO/IEC 14496-2, from tools/web/make_tables.py: digits in base 36. */",
@@ -44,17 +49,32 @@ def make_tables() -> str:
             "/** Groups of FAPs 1 to 68 and of BAPs 1 to 296, from 0. */",
             f"export const FAP_GROUPS = {_groups(fap_groups())};",
             f"export const BAP_GROUPS = {_groups(bap_groups())};",
-            "/** Quantiser steps of FAPs 3 to 68 and BAPs 1 to 186, as places in this list; else 1. */",
+            f"const FACE_STEPS = {face_steps};",
+            f"const ISO_STEPS = {iso_places};",
+            "/** Quantiser steps; of a select, which has none, 0. */",
             f"export const STEPS = {steps};",
-            f"export const FAP_STEPS = {_digits(map(steps.index, faps.tolist()))};",
-            f"export const BAP_STEPS = {{\n{bap_tables},\n}};",
-            "/** Default limits of FAPs 3 to 68, up and down, in units of 60: in I planes, in P planes. */",
-            f"export const FAP_LIMITS = [{_digits(limits[0, FAPS])}, {_digits(limits[2, FAPS])}];",
-            "/** Those of BAPs 1 to 186, as magnitudes: in I planes up and down, in P planes both. */",
-            f"export const BAP_LIMITS = [{', '.join(map(_digits, (i_max, i_min, p_max)))}];",
+            "/** The steps of all slots, up to that of BAP 186, as places in the list above; else 1. */",
+            "export const STEP_PLACES = {",
+            "  iso: FACE_STEPS + ISO_STEPS,",
+            f'  visage: FACE_STEPS + ISO_STEPS.slice(0, -6).replace(/[{replaced}]/g, "{common}") + "{last}",',
+            "};",
+            f"const I_FACE = {face_limits[0]};",
+            f"const P_BOTH = {face_limits[1][:-1]}{_digits(p_max)[1:]};",
+            "/** Default limits of all slots up to BAP 186, in units of 60: I max, I min, P max, P min. */",
+            "export const LIMITS = [",
+            f"  I_FACE + {_digits(i_max)},",
+            f"  I_FACE + {_digits(i_min)},",
+            "  P_BOTH,",
+            "  P_BOTH,",
+            "];",
             "",
         ]
     )
+
+
+def _face(before: str, digits: str) -> str:
+    """Return a table of the slots of a face: visemes and expressions, FAPs 3 to 68, and the flags."""
+    return f'"{before}{digits[1:-1]}000"'
 
 
 def make_figure_tables() -> str:

@@ -10,6 +10,7 @@ import tempfile
 from importlib.resources import files
 from pathlib import Path
 from threading import Timer
+from typing import TYPE_CHECKING
 
 import click
 
@@ -23,12 +24,17 @@ from fba.encoder_options import EncoderOptions
 from fba.errors import DisplayError
 from fba.parameters import BapTable
 
+if TYPE_CHECKING:
+    from fba_player.window.surface import Surface
+
 BAP_STEPS: BapTable = "visage"
 """The standard's own table moves the root in steps of 64 mm, which is visible."""
 SAMPLES = ("hello.bvh", "hello.fap")
 """A body and a face."""
 CAPTURE = "talk.c3d"
 """Markers on a face."""
+TITLE = "fba demo"
+"""Title of the window."""
 SECONDS_BEFORE_NOTICE = 4.0
 """Seconds after which a line explains the wait."""
 COMPILING = "compiling for this machine, on the first run only: about half a minute in all"
@@ -56,6 +62,7 @@ def command(
 
     folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
     folder.mkdir(parents=True, exist_ok=True)
+    surface = None if play is False else _open_window(asked=play is True)
     stream, video, picture = (folder / f"hello{suffix}" for suffix in (".fba", ".mp4", ".png"))
     sources = [folder / name for name in SAMPLES]
     capture, talk = folder / CAPTURE, folder / "talk.fba"
@@ -84,8 +91,8 @@ def command(
     )
     decoded = read(stream)
     click.echo(f"decoded: {len(decoded)} frames at {rate_text(decoded.rate)} frames/s")
+    shown = surface is not None and _play(decoded, surface, asked=play is True)
     _encode_capture(capture, talk, outputs)
-    shown = play is not False and _play(decoded, asked=play is True)
     if not shown:
         _render(decoded, video, picture)
     quoted = shlex.quote(str(stream))
@@ -110,19 +117,41 @@ def _encode_capture(capture: Path, stream: Path, outputs: Outputs) -> None:
     )
 
 
-def _play(animation: Animation, *, asked: bool) -> bool:
+def _open_window(*, asked: bool) -> Surface | None:
+    """Open the window, before work that takes some seconds; return None where there is no display."""
     from fba import player
 
+    surface = player.Surface()
     try:
-        player.check_display()
-        click.echo("opening a window; Esc closes it")
-        player.play(animation, loop=True, title="fba demo")
+        surface.open(TITLE)
     except DisplayError as error:
-        if asked:
-            raise
-        click.echo(f"{str(error).splitlines()[0].partition('. ')[0]}; making a film instead")
-        return False
+        _say_why_not(error, asked=asked)
+        return None
+    click.echo("opening a window; Esc closes it")
+    return surface
+
+
+def _play(animation: Animation, surface: Surface, *, asked: bool) -> bool:
+    """Play an animation, then the files dropped onto the window; return whether that was possible."""
+    from fba import player
+    from fba.formats import read
+
+    with surface:
+        try:
+            dropped = player.play(animation, title=TITLE, surface=surface, life=True, from_face=True)
+            while dropped:
+                file = dropped[0]
+                dropped = player.play(read(file), title=file.name, file=file, surface=surface)
+        except DisplayError as error:
+            _say_why_not(error, asked=asked)
+            return False
     return True
+
+
+def _say_why_not(error: DisplayError, *, asked: bool) -> None:
+    if asked:
+        raise error
+    click.echo(f"{str(error).splitlines()[0].partition('. ')[0]}; making a film instead")
 
 
 def _can_open_a_window() -> bool:

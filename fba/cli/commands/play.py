@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import click
 
 from fba.cli import options, scenes
 from fba.cli.command import Command, examples
-from fba.cli.inputs import ReadFile
+from fba.cli.inputs import ReadFile, read_file
 from fba.cli.live_streams import SOURCE, Receiving, is_from_network
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.scenes import MOST_FILES, SceneOptions, SoundOptions, check_files
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from fba.animation import Animation
     from fba_player.playback.live import LiveAnimation
     from fba_player.view.protocols import Showable
+    from fba_player.window.surface import Surface
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +33,11 @@ class _Window:
     loop: bool = option(default=False, help="Start again at the end.")
     interpolate: bool = option(default=True, help="Smooth motion between frames, or frame by frame.")
     size: tuple[int, int] = options.size_option(default=(1280, 720), typed="1280x720", show_default=True)
+    life: bool = option(
+        default=False,
+        help="Blink, look about and breathe where the file does not move the figure; only in the window, not "
+        "in films and pictures.",
+    )
 
 
 @click.command(
@@ -88,21 +95,33 @@ def command(
     from fba import player
 
     player.check_display()  # before work that takes long
-    if not files:
-        dropped = _puppet(how, window.size)
-    else:
-        dropped = _play(files, how, sound, window, receiving, compare=compare, start=start, paused=paused)
-    while dropped:
-        beside = SoundOptions(no_audio=sound.no_audio)
-        dropped = _play(dropped[:MOST_FILES], replace(how, arrange=None), beside, window, receiving)
+    with player.Surface(window.size) as surface:
+        surface.read = partial(read_file, reading=how)
+        shown = _Shown(surface, window, receiving)
+        if not files:
+            dropped = _puppet(how, shown)
+        else:
+            dropped = _play(files, how, sound, shown, compare=compare, start=start, paused=paused)
+        while dropped:
+            again = surface.resumed is not None
+            beside = sound if again else SoundOptions(no_audio=sound.no_audio)
+            dropped = _play(dropped[:MOST_FILES], how if again else replace(how, arrange=None), beside, shown)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """The window that scenes are shown in, one after the other, and how."""
+
+    surface: Surface
+    window: _Window
+    receiving: Receiving
 
 
 def _play(
     files: tuple[Path, ...],
     how: SceneOptions,
     sound: SoundOptions,
-    window: _Window,
-    receiving: Receiving,
+    shown: _Shown,
     *,
     compare: bool = False,
     start: float | None = None,
@@ -111,6 +130,7 @@ def _play(
     """Play files in a window; return the files that were dropped onto it."""
     from fba import player
 
+    window, receiving = shown.window, shown.receiving
     audio = scenes.find_sound(files, sound, "played without sound")
     streams: list[LiveAnimation] = []
     whole: list[ReadFile] = []
@@ -129,13 +149,17 @@ def _play(
             animation.name if name == "-" or is_from_network(file) else name
             for file, name, animation in zip(files, scenes.display_names(files), animations, strict=True)
         ]
-        scene = scenes.build_scene(animations, names, how, over=compare)
+
+        def build() -> Showable:
+            scene: Showable = scenes.build_scene(animations, names, how, over=compare)
+            _check_start(scene, start, growing=bool(streams))
+            return scene
+
         tables = [read.table for read in whole if read.table is not None]
         doubts = [read.doubt for read in whole if read.doubt is not None]
-        _check_start(scene, start, growing=bool(streams))
         single = len(files) == 1 and not streams and str(files[0]) != "-" and not scenes.is_pipe(files[0])
         return player.play(
-            scene,
+            build,
             title=" | ".join(names),
             camera=how.camera,
             start=start,
@@ -150,6 +174,8 @@ def _play(
             loop=window.loop,
             speed=window.speed,
             interpolate=window.interpolate,
+            life=window.life,
+            surface=shown.surface,
         )
     finally:
         for stream in streams:
@@ -159,16 +185,22 @@ def _play(
         receivers.close()
 
 
-def _puppet(how: SceneOptions, size: tuple[int, int]) -> tuple[Path, ...]:
+def _puppet(how: SceneOptions, shown: _Shown) -> tuple[Path, ...]:
     """Open a window with a neutral figure and sliders that move it; return the files dropped onto it."""
     from fba import player
     from fba_player.session.performer import neutral
 
     title = " ".join(file.name for file in (how.model, how.body) if file is not None) or "puppet"
     person = how.body is not None or how.model is None
-    scene = scenes.build_scene([neutral(body=person)], [title], how)
     return player.play(
-        scene, title=title, size=size, camera=how.camera, loop=True, paused=True, panels=("puppet",)
+        lambda: scenes.build_scene([neutral(body=person)], [title], how),
+        title=title,
+        size=shown.window.size,
+        camera=how.camera,
+        loop=True,
+        paused=True,
+        panels=("puppet",),
+        surface=shown.surface,
     )
 
 

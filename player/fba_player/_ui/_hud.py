@@ -11,6 +11,7 @@ from fba_player.playback._timeline import clock_text
 from fba_player.playback.live import LiveAnimation
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
+from fba_player.session._keys import key_of
 from fba_player.session._session import Session
 
 NOTICE_DISTANCE = 40.0
@@ -23,6 +24,13 @@ SLOW = 0.9
 """Speed below which a recording says that the window is slower than its film."""
 MAX_NAME_SHARE = 0.25
 """Share of the window's width that the name and the facts may take together: a figure is in the middle."""
+WELCOME_HEIGHT = 44.0
+"""Points that the strip of hints takes above the bar."""
+HINTS = (
+    ("panel file", "contents of the file"), ("panel curves", "curves"), ("panel puppet", "move it by hand"),
+    ("lanes", "lanes of the timeline"), ("panel help", "all keys"),
+)  # fmt: skip
+"""Actions, and what the strip in the first window says of their keys."""
 MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
@@ -132,10 +140,40 @@ def _flat_button(label: str, *, lit: bool) -> bool:
     return bool(pressed)
 
 
+def draw_welcome(session: Session, display: tuple[float, float], above: float) -> None:
+    """Draw where things are, above the bar, until the user has read it; opening a panel counts as that."""
+    memory = session.memory
+    if memory is None or not session.greets or display[0] < 640 or display[1] < 300:
+        return
+    hints = [(key_of(action), text) for action, text in HINTS]
+    if _hints_width(hints) > display[0] - 2 * EDGE:
+        hints = hints[-1:]
+    width = _hints_width(hints)
+    imgui.set_next_window_pos(((display[0] - width) / 2, display[1] - above - 52))
+    imgui.set_next_window_size((width, 40))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, (16, 7))
+    imgui.begin("##welcome", None, STANDING)
+    for key, text in hints:
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.ACCENT, key)
+        imgui.same_line(0, 6)
+        imgui.text_unformatted(text)
+        imgui.same_line(0, 24)
+    if imgui.button("Got it") or session.open:
+        memory.welcome()
+    imgui.end()
+    imgui.pop_style_var()
+
+
+def _hints_width(hints: list[tuple[str, str]]) -> float:
+    texts = sum(imgui.calc_text_size(key).x + imgui.calc_text_size(text).x + 30 for key, text in hints)
+    return texts + float(imgui.calc_text_size("Got it").x) + 2 * 16 + 2 * imgui.get_style().frame_padding.x
+
+
 def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
     """Draw the notices, centred above the bar."""
     to = imgui.get_foreground_draw_list()
-    y = display[1] - above - NOTICE_DISTANCE
+    y = display[1] - above - NOTICE_DISTANCE - (WELCOME_HEIGHT if session.greets else 0.0)
     for notice in reversed(session.notices()):
         alpha = min((notice.until - session.clock()) / FADE_SECONDS, 1.0)
         colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)

@@ -110,6 +110,8 @@ stepped = _icon(
     _line((-0.95, 0.6), (-0.3, 0.6), (-0.3, 0.0), (0.3, 0.0), (0.3, -0.6), (0.95, -0.6), width=0.2)
 )
 """Stairs: motion frame by frame."""
+lanes = _icon(_box(-0.9, -0.7, 0.35, -0.35), _box(-0.3, -0.17, 0.9, 0.17), _box(-0.9, 0.35, 0.1, 0.7))
+"""Bars one below the other: the lanes of the timeline."""
 camera = _icon(_box(-0.42, -0.78, 0.42, -0.3, 0.12), _camera_body, _ring(0.1, 0.34, 0.2))
 record = _icon(_ring(0.0, 0.85, 0.18), _dot)
 sound = _icon(_loudspeaker, _arc(0.12, 0.42, -0.75, 0.75, 0.18), _arc(0.12, 0.8, -0.75, 0.75, 0.18))

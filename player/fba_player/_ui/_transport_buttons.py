@@ -20,6 +20,9 @@ BUTTON_SIZE = 30.0
 BUTTON_GAP = 4.0
 """Width and height of a button, and the space between two, in points."""
 
+LEAST_SLIDER, SLIDER_GAP = 70.0, 26.0
+"""Least width of the slider of the speed, and the space around it, in points."""
+
 
 class Buttons:
     """Draws the row; buttons without room are left out."""
@@ -98,6 +101,8 @@ class Buttons:
                 text += f"\nbegins {abs(session.sound_offset):.2f} s {when}"
             buttons.append(("mute", icons.muted if quiet else icons.sound, text, False))
         x = wide - SIDE_MARGIN + gap
+        if x - (len(buttons) + 1) * (size + gap) - taken - SLIDER_GAP >= LEAST_SLIDER:
+            buttons.insert(4, ("lanes", icons.lanes, "lanes: what is said, felt and heard; all; none", False))
         for action, icon, text, lit in buttons:
             x -= size + gap
             if x < taken + 8:
@@ -109,8 +114,8 @@ class Buttons:
                 louder = session.audio.volume + 0.05 * imgui.get_io().mouse_wheel
                 session.audio.volume = min(max(louder, 0.0), 1.0)
             tooltip(text, key_of(action))
-        slider = min(118.0, x - taken - 26)
-        if slider < 70:
+        slider = min(118.0, x - taken - SLIDER_GAP)
+        if slider < LEAST_SLIDER:
             return
         text = f"{transport.speed:g}x"
         wide_text = imgui.calc_text_size(text).x

@@ -8,7 +8,7 @@ from imgui_bundle import imgui, implot
 
 from fba_player._ui import theme
 from fba_player._ui._bar import Bar
-from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_work, live_message
+from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_welcome, draw_work, live_message
 from fba_player._ui._imgui_renderer import ImguiRenderer
 from fba_player._ui._panel_windows import PanelWindows
 from fba_player._ui.panels.registry import make_panels
@@ -135,6 +135,8 @@ class Gui:
             if self._page is None:  # the title of a page's window says it
                 draw_name(session, display, taken, left - 20)
             imgui.pop_style_var()
+        if self._page is None:
+            draw_welcome(session, display, below * self.shown)
         closed = self._open - session.open
         self._panel_windows.forget(closed)
         for panel in self.panels:
@@ -149,7 +151,7 @@ class Gui:
 
     def _bar_height(self, display: tuple[float, float]) -> float:
         """Return the height of the bar in points; 0 in a window that plays nothing."""
-        return self.bar.height(display) if self._plays else 0.0
+        return self.bar.height(self.session, display) if self._plays else 0.0
 
     def _hide(self, io: imgui.IO) -> None:
         session = self.session

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 from pathlib import Path
 
 import imgui_bundle
@@ -23,12 +24,14 @@ RAISED: Colour = (0.155, 0.165, 0.182, 1.0)
 HOVERED: Colour = (0.215, 0.23, 0.255, 1.0)
 HOLLOW: Colour = (0.0, 0.0, 0.0, 0.22)
 LINE: Colour = (1.0, 1.0, 1.0, 0.075)
-FEELINGS: dict[str, Colour] = {
-    "joy": (0.98, 0.80, 0.25, 1.0), "sadness": (0.35, 0.55, 0.92, 1.0), "anger": (0.92, 0.32, 0.28, 1.0),
-    "fear": (0.66, 0.46, 0.90, 1.0), "disgust": (0.45, 0.75, 0.38, 1.0), "surprise": (0.98, 0.58, 0.24, 1.0),
-    "sleepiness": (0.55, 0.62, 0.70, 1.0),
-}  # fmt: skip
-"""Colours of the expressions that a face may be read to show: the families, and those without one."""
+HUES = {"joy": 45, "sadness": 220, "anger": 4, "fear": 268, "disgust": 110, "surprise": 26, "sleepiness": 200}
+"""Hues of expressions in degrees, those of the web page."""
+
+
+def name_colour(name: str) -> Colour:
+    """Return the colour of a viseme or an expression in lanes, the same as on the web page."""
+    hue = HUES[name] if name in HUES else (47 * len(name) + 31 * ord(name[0])) % 360
+    return (*colorsys.hls_to_rgb(hue / 360, 0.55, 0.6), 1.0)
 
 
 def packed(colour: Colour, alpha: float = 1.0) -> int:

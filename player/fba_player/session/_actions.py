@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from fba_player.session._session import Session
+from fba_player.session._session import LANES, Session
 
 FOLLOW_TEXTS = {None: "by itself", "hips": "the hips", "head": "the head", "none": "nothing"}
 """What the camera follows, as users read it."""
+LANE_TEXTS = {"content": "what is said, felt and heard", "all": "all", "none": "none"}
+"""Lanes of the timeline, as users read it."""
+ZOOM = 0.5
+"""Factor on the time that the timeline shows, for one key press."""
+PAGE = 0.8
+"""Share of the time shown by which one key press moves it."""
 SOUND_SHIFT = 0.02
 """Seconds by which one key press shifts the sound."""
 
@@ -57,6 +63,20 @@ def _follow_that(session: Session, what: str | None) -> None:
 def _orbit(session: Session) -> None:
     session.viewpoint.toggle_orbit()
     session.say("the camera turns" if session.scene.orbit else "the camera stays", about="camera")
+
+
+def _lanes(session: Session) -> None:
+    session.lanes = LANES[(LANES.index(session.lanes) + 1) % len(LANES)]
+    session.say(f"lanes of the timeline: {LANE_TEXTS[session.lanes]}", about="lanes")
+
+
+def _zoom(session: Session, factor: float) -> None:
+    time = session.transport.time
+    session.zoom.zoom(factor, min(max(time, session.zoom.low), session.zoom.high))
+
+
+def _turn_page(session: Session, pages: float) -> None:
+    session.zoom.pan(pages * PAGE * (session.zoom.high - session.zoom.low))
 
 
 def _mute(session: Session) -> None:
@@ -108,6 +128,12 @@ _ACTIONS: dict[str, Callable[[Session], None]] = {
     "sound_earlier": partial(_shift_sound, seconds=-SOUND_SHIFT),
     "sound_later": partial(_shift_sound, seconds=SOUND_SHIFT),
     "bare": _bare,
+    "lanes": _lanes,
+    "zoom_in": partial(_zoom, factor=ZOOM),
+    "zoom_out": partial(_zoom, factor=1 / ZOOM),
+    "zoom_fit": lambda session: session.zoom.reset(),
+    "page_back": partial(_turn_page, pages=-1),
+    "page_on": partial(_turn_page, pages=1),
     "close": Session.leave,
     "escape": Session.escape,
     **{

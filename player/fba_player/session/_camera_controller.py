@@ -14,6 +14,10 @@ ORBIT_SECONDS = 20.0
 """Seconds in which the camera turns once around the subject, if nothing else is said."""
 GLIDE_SECONDS = 0.35
 """Seconds that a glide to another view takes."""
+FACE_SECONDS = 3.5
+"""Seconds for which a window that begins with the face shows it."""
+LEAVING_SECONDS = 1.8
+"""Seconds of the glide from there to the whole."""
 NOT_SHIFTED = (0.0, 1.0)
 """Shift of the middle as a share of the width, and factor on the distance, where no panels are open."""
 MIN_FREE_WIDTH = 0.2
@@ -46,6 +50,8 @@ class Viewpoint:
         self._clock = clock
         self._from = self._to = self.beginning
         self._until = -math.inf
+        self._glide_seconds = GLIDE_SECONDS
+        self._face_until: float | None = None
         self._preset = camera if not isinstance(camera, Camera) else ""
         self._of_head = self._preset in FACE_PRESETS
         self._time = 0.0
@@ -58,7 +64,7 @@ class Viewpoint:
     @property
     def camera(self) -> Camera:
         """The camera now; setting it cuts to the new one."""
-        share = self._progress(self._until)
+        share = self._progress(self._until, self._glide_seconds)
         return self._to if share >= 1.0 else self._from.between(self._to, share)
 
     @camera.setter
@@ -97,8 +103,38 @@ class Viewpoint:
             self._shift = self._shift_between(*self._sides)
         self._fitted_to = ((self.aspect, self.covered), self._fitted_to[1])
 
-    def glide(self, camera: Camera) -> None:
-        self._from, self._to, self._until = self.camera, camera, self._clock() + GLIDE_SECONDS
+    def glide(self, camera: Camera, seconds: float = GLIDE_SECONDS) -> None:
+        self._from, self._to, self._until = self.camera, camera, self._clock() + seconds
+        self._glide_seconds = seconds
+
+    def begin_with_face(self) -> None:
+        """Show the face for some seconds from the first picture on, then what the first view is."""
+        self._preset, self._of_head = "face", True
+        self.camera = self.fit("face")
+        self._face_until = math.inf
+
+    def _leave_face(self) -> None:
+        """Go back to the first view when it is time, unless somebody has moved the camera."""
+        if self._face_until is None:
+            return
+        if self._preset != "face" or self._to != self._fitted_to[1]:
+            self._face_until = None
+        elif self._face_until == math.inf:
+            self._face_until = self._clock() + FACE_SECONDS
+        elif self._clock() >= self._face_until:
+            self._face_until = None
+            self.reset(LEAVING_SECONDS)
+
+    @property
+    def view(self) -> Camera | str | None:
+        """The name of the view, None for the first one, or the camera where somebody has moved it."""
+        return self._preset if self._preset != "" and self._to == self._fitted_to[1] else self.camera
+
+    def restore(self, view: Camera | str | None) -> None:
+        """Cut to a view of `view`."""
+        self._preset = "" if isinstance(view, Camera) else view
+        self._of_head = self._preset in FACE_PRESETS
+        self.camera = view if isinstance(view, Camera) else self.fit(view)
 
     def preset(self, name: str) -> None:
         """Glide to a preset. Raises ValueError for an unknown name."""
@@ -116,15 +152,16 @@ class Viewpoint:
         self._shift = self._shift_between(left, right)
         self._shift_until = self._clock() + GLIDE_SECONDS if smoothly else -math.inf
 
-    def reset(self) -> None:
+    def reset(self, seconds: float = GLIDE_SECONDS) -> None:
         """Glide to the first view."""
         self._preset = self._first_view if not isinstance(self._first_view, Camera) else ""
         self._stay(lambda: setattr(self, "_of_head", self._preset in FACE_PRESETS))
-        self.glide(self.beginning)
+        self.glide(self.beginning, seconds)
 
     def camera_without_panels(self, time: float) -> Camera:
         """Return the camera at a time in seconds, for a picture without panels at the sides."""
         self._time = time
+        self._leave_face()
         return self.camera.move(self._followed()).orbit(self._turned(), 0.0)
 
     def camera_at(self, time: float) -> Camera:
@@ -189,9 +226,9 @@ class Viewpoint:
         change()
         self.camera = camera.move(before).move(self._followed(), -1.0)
 
-    def _progress(self, until: float) -> float:
+    def _progress(self, until: float, seconds: float = GLIDE_SECONDS) -> float:
         """Return the progress, 0 to 1, of a glide that ends at a reading of the clock, slow at both ends."""
-        return float(smoothstep(1.0 - (until - self._clock()) / GLIDE_SECONDS))
+        return float(smoothstep(1.0 - (until - self._clock()) / seconds))
 
     def _shift_now(self) -> tuple[float, float]:
         share = self._progress(self._shift_until)

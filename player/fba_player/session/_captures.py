@@ -221,7 +221,7 @@ def draw_screenshot(
     try:
         if transparent:
             scene.show("background", "transparent")
-        view, camera = session.view(time), session.viewpoint.camera_without_panels(time)
+        view, camera = session.view(time, captured=True), session.viewpoint.camera_without_panels(time)
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)] if transparent else [view]
         pictures = []
         for shown in views:

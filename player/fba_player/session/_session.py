@@ -18,6 +18,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
+from fba_player.playback._time_zoom import TimeZoom
 from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._camera_controller import Viewpoint
@@ -30,10 +31,15 @@ from fba_player.view.protocols import Showable
 from fba_player.view.switches import SWITCHES, Switch
 
 if TYPE_CHECKING:
+    from fba_player.session._life import Life
+    from fba_player.session._memory import Memory
+    from fba_player.sound._peaks import Peaks
     from fba_player.sound._player import Audio
 
 Hook = Callable[[Float32, Float64], None]
 
+LANES = ("content", "all", "none")
+"""Lanes of the timeline: what is said, felt and heard; also which groups move; none."""
 NOTICE_SECONDS = 4.0
 LEAVING_SECONDS = 6.0
 """Seconds in which closing again discards unsaved work."""
@@ -59,27 +65,42 @@ class Notice:
 
 @dataclass
 class Selection:
-    """The FAPs and BAPs that the user has selected, by number, in the order of selection."""
+    """What the user has selected, in the order of selection: FAPs and BAPs by number, and derived curves.
+
+    derived: (kind, number), see `fba_player._ui.panels._derived`.
+    """
 
     faps: list[int] = field(default_factory=list)
     baps: list[int] = field(default_factory=list)
+    derived: list[tuple[str, int]] = field(default_factory=list)
+
+    @property
+    def all(self) -> list[tuple[str, int]]:
+        """(kind, number) of all: FAPs, BAPs, derived curves."""
+        return [("fap", one) for one in self.faps] + [("bap", one) for one in self.baps] + self.derived
+
+    def choose(self, chosen: list[tuple[str, int]]) -> None:
+        """Select these (kind, number), and nothing else."""
+        self.faps = [number for kind, number in chosen if kind == "fap"]
+        self.baps = [number for kind, number in chosen if kind == "bap"]
+        self.derived = [row for row in chosen if row[0] not in ("fap", "bap")]
 
     def toggle(self, kind: str, number: int) -> None:
-        """Add a parameter to the selection, or remove it. kind: "fap" or "bap"."""
-        selected = self.faps if kind == "fap" else self.baps
-        if number in selected:
-            selected.remove(number)
-        else:
-            selected.append(number)
+        """Add a curve to the selection, or remove it. kind: "fap", "bap" or that of a derived curve."""
+        row, chosen = (kind, number), self.all
+        self.choose([one for one in chosen if one != row] if row in chosen else [*chosen, row])
 
 
 class Session:
     """The state that the window and its panels share.
 
     scene, transport, viewpoint: what is shown, its current time, and the camera. exports: see `Exports`.
-    source: the file behind it. selection: FAPs and BAPs. open: names of the open panels. bare: whether
+    source: the file behind it. selection: the curves. open: names of the open panels. bare: whether
     everything but the picture is hidden. size: of the picture in pixels. scale: pixels per point of the
-    display.
+    display. zoom: the part of the time that timeline and curves show. lanes: which lanes the timeline has,
+    one of `LANES`. peaks: the outline of the sound. life: signs of life that windows show while they play,
+    None for none; films and pictures do not have them. memory: what is remembered for other windows, None for
+    nothing. read: reads a file, to see whether it can be opened.
 
     before_frame: functions called as hook(faps, baps) before each picture; they may change the values that
     will be shown in place: FAPs, float32 (68,), and BAPs, float64 (296,), zeros without a body.
@@ -90,7 +111,8 @@ class Session:
     hooks. sound: path of the sound file; audio: its player, None without a sound device; the sound begins
     sound_offset seconds after the first frame, see `shift_sound`. rolling: names of what needs new pictures
     without input. unsaved: what would be lost if the window closed, see `leave`. dropped: files to open next,
-    see `drop`. popup: whether a list is open over the picture; set to False to close it.
+    see `drop`; resumes: whether they go on where the window is, see `reload`. popup: whether a list is open
+    over the picture; set to False to close it.
     """
 
     def __init__(
@@ -112,6 +134,9 @@ class Session:
         self.clock = clock
         self.viewpoint = Viewpoint(scene, size[0] / max(size[1], 1), camera, clock=self._now)
         self.selection = Selection()
+        self.zoom = TimeZoom()
+        self.lanes = LANES[0]
+        self.peaks: Peaks | None = None
         self.open: set[str] = set()
         self.bare = False
         self.closing = False
@@ -123,13 +148,17 @@ class Session:
         self.unsaved: set[str] = set()
         self.exports = Exports(scene, self.say, self.rolling, self.unsaved)
         self.dropped: tuple[Path, ...] = ()
+        self.resumes = False
+        self.life: Life | None = None
+        self.memory: Memory | None = None
+        self.read: Callable[[Path], object] = _read
         self.full_screen = False
         self.popup = False
         self.audio: Audio | None = None
         self.sound: PathLike | None = None
         self.sound_offset = 0.0
         self.values: tuple[Float32, Float64] = (np.zeros(68, np.float32), np.zeros(296))
-        self.last_input = clock()
+        self.last_input = self._began = clock()
         self._notices: list[Notice] = []
         self._leave_again_until = -math.inf
 
@@ -183,21 +212,38 @@ class Session:
         self.closing = True
 
     def drop(self, paths: tuple[Path, ...]) -> None:
-        """Close the window to open dropped files; if one cannot be read, say so and stay open."""
+        """Leave the scene to open dropped files; if one cannot be read, say so and stay."""
+        if not self._can_open(paths):
+            return
+        self.leave()
+        if self.closing:
+            self.dropped = paths
+
+    def reload(self, path: Path) -> None:
+        """Leave the scene to show its file again, which has changed, from where it is now."""
+        if self.unsaved:
+            what = " and ".join(sorted(self.unsaved))
+            self.say(f"{path.name} has changed; save or discard {what}, then open it again", "warning", 8.0)
+        elif self._can_open((path,)):
+            self.dropped, self.resumes, self.closing = (path,), True, True
+
+    def _can_open(self, paths: tuple[Path, ...]) -> bool:
         from fba.errors import FbaError
-        from fba.formats import read
 
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # given again when they are opened
                 for path in paths:
-                    read(path)
+                    self.read(path)
         except (FbaError, OSError) as error:
             self.say(f"Cannot be opened: {error}", "error", 8.0, about="drop")
-            return
-        self.leave()
-        if self.closing:
-            self.dropped = paths
+            return False
+        return True
+
+    @property
+    def greets(self) -> bool:
+        """Whether the hints of the first window are shown."""
+        return self.memory is not None and not self.memory.welcomed and not self.bare
 
     def _now(self) -> float:
         """Return the reading of the clock, which is another while a film is recorded."""
@@ -224,6 +270,7 @@ class Session:
             self.viewpoint.gliding
             or bool(self.rolling)
             or self.recording is not None
+            or (self.peaks is not None and self.peaks.reading)
             or any(notice.until < fades_from for notice in self._notices)
         )
 
@@ -233,15 +280,22 @@ class Session:
         if self.audio is not None:
             self.audio.offset = self.sound_offset
 
-    def view(self, time: float) -> View:
-        """Return what is drawn at a time in seconds, after the hooks of `before_frame`."""
+    def view(self, time: float, *, captured: bool = False) -> View:
+        """Return what is drawn at a time in seconds, after the hooks of `before_frame`.
+
+        captured: whether it is for a picture or film that is saved.
+        """
         scene = self.scene
-        if not self.before_frame or not isinstance(scene, Scene):
+        lives = self.life if self.transport.playing and self.recording is None and not captured else None
+        if not isinstance(scene, Scene) or not (self.before_frame or lives):
             return scene.view_at(time)
         faps, baps = scene.timeline.faps(time).copy(), scene.timeline.baps(time).copy()
         for hook in tuple(self.before_frame):
             hook(faps, baps)
         self.values = (faps, baps)
+        if lives is not None:
+            faps, baps = faps.copy(), baps.copy()
+            lives(self.clock() - self._began, faps, baps)
         return scene.view_for(faps, baps)
 
     def toggle_view(self) -> None:
@@ -270,3 +324,9 @@ class Session:
 
     def camera(self, time: float) -> Camera:
         return self.viewpoint.camera_at(time)
+
+
+def _read(path: Path) -> object:
+    from fba.formats import read
+
+    return read(path)

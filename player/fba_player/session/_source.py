@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING
 from fba.animation import Animation
 from fba.errors import FbaError
 from fba.parameters import BapTable
+from fba_player.playback._lanes import Lane, lane_of_expressions, lane_of_visemes
 from fba_player.playback.live import LiveAnimation
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
+from fba_player.session._group_activity import Activity, read_activity
 from fba_player.session._timeline_trace import (
     Stretch,
     Trace,
+    lane_of_stretches,
     read_stretches,
     trace_of_motion,
     trace_of_planes,
@@ -58,8 +61,13 @@ class Source:
         self._trace_info: StreamInfo | None = None
         self._trace: Trace | None = None
         self._thread: threading.Thread | None = None
+        self._stamp = self._newer = self._stat()
         self.expressions: tuple[Stretch, ...] = ()
         """What the face shows when; empty until `probe` is done, and for live streams."""
+        self.lanes: tuple[Lane, ...] = ()
+        """What is said and felt when; empty until `probe` has found it, and for live streams."""
+        self.activity: Activity | None = None
+        """Which groups move when; None until `probe` is done, and for live streams."""
 
     @property
     def name(self) -> str:
@@ -77,6 +85,26 @@ class Source:
             self._scene_info, self._updated = self._info_of_scene(), now
         assert self._scene_info is not None
         return self._scene_info
+
+    def changed(self) -> bool:
+        """Return once whether the file has changed, and has been left alone since the last call."""
+        now = self._stat()
+        if now is None or now == self._stamp:
+            return False
+        if now != self._newer:  # it may still be being written
+            self._newer = now
+            return False
+        self._stamp = now
+        return True
+
+    def _stat(self) -> tuple[int, int] | None:
+        if self.path is None:
+            return None
+        try:
+            stat = os.stat(self.path)
+        except OSError:
+            return None
+        return stat.st_mtime_ns, stat.st_size
 
     def probe(self, *, wait: bool = False) -> None:
         """Read the planes, bits and damage of the file; in the background unless `wait` is True."""
@@ -134,4 +162,9 @@ class Source:
             trace = trace_of_motion(animation)
         self._trace = trace
         if isinstance(self._scene, Scene) and isinstance(animation, Animation):
+            sent = lane_of_visemes(animation), lane_of_expressions(animation)
+            self.lanes = tuple(lane for lane in sent if lane is not None)
+            self.activity = read_activity(animation, self._scene.model)
             self.expressions = read_stretches(animation, self._scene.model)
+            felt = lane_of_stretches(self.expressions)
+            self.lanes += () if felt is None else (felt,)

@@ -1,7 +1,7 @@
-"""What lies behind and below the timeline.
+"""What lies behind and above the timeline.
 
-Behind: a graph of the bits of each plane, I planes in another colour, or of the amount of motion. Below: a
-strip of the expressions that a face shows.
+Behind: a graph of the bits of each plane, I planes in another colour, or of the amount of motion. Above: a
+lane of the expressions that a face is read to show.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from fba.emotion import Readings, read_expressions
 from fba.emotion.recogniser import NEUTRAL, UNKNOWN
 from fba.errors import OptionError
 from fba.face import FaceSettings
+from fba_player.playback._lanes import Lane
 
 PREDICTED = (120, 160, 190)
 INTRA = (238, 178, 84)
@@ -81,17 +82,21 @@ def trace_picture(trace: Trace, low: float, high: float, size: tuple[int, int]) 
     """
     width, height = size
     picture = np.zeros((height, width, 4), dtype=np.uint8)
-    amounts, shares = trace.amounts, np.clip((trace.times - low) / max(high - low, 1e-9), 0.0, 1.0)
-    if not len(amounts) or amounts.max() <= 0:
+    largest = trace.amounts.max(initial=0.0)
+    first = max(int(np.searchsorted(trace.times, low, side="right")) - 1, 0)
+    part = slice(first, int(np.searchsorted(trace.times, high, side="right")))
+    amounts, intra = trace.amounts[part], trace.intra[part]
+    shares = np.clip((trace.times[part] - low) / max(high - low, 1e-9), 0.0, 1.0)
+    if not len(amounts) or largest <= 0:
         return picture
     starts = np.clip(np.floor(shares * (width - 1)).astype(int), 0, width - 1)
     tall = np.zeros(width)
     np.maximum.at(tall, starts, amounts)
     owner = np.maximum.accumulate(np.where(tall > 0, np.arange(width), 0))
     key = np.zeros(width, dtype=bool)
-    key[starts[trace.intra]] = True
+    key[starts[intra]] = True
     key = key[owner]
-    tall = np.sqrt(tall[owner] / amounts.max())
+    tall = np.sqrt(tall[owner] / largest)
     tall[tall > 0] = MIN_HEIGHT + (1 - MIN_HEIGHT) * tall[tall > 0]
     filled = np.bincount(starts, minlength=width) > 0
     if width / len(amounts) >= MIN_GAP_WIDTH:
@@ -136,9 +141,21 @@ def read_stretches(animation: Animation, model: FaceSettings | None) -> tuple[St
     return _stretches(readings, float(animation.index[0] / animation.rate), 1 / float(animation.rate))
 
 
-def stretch_at(stretches: tuple[Stretch, ...], time: float) -> Stretch | None:
-    """Return the stretch at a time in seconds; None without one."""
-    return next((stretch for stretch in stretches if stretch.start <= time < stretch.end), None)
+def lane_of_stretches(stretches: tuple[Stretch, ...]) -> Lane | None:
+    """Return the lane of the expressions that a face is read to show; None without any."""
+    shown = [stretch for stretch in stretches if stretch.shows]
+    if not shown:
+        return None
+    labels = tuple(dict.fromkeys(stretch.label for stretch in shown))
+    return Lane(
+        "felt",
+        labels,
+        np.array([stretch.start for stretch in shown]),
+        np.array([stretch.end for stretch in shown]),
+        np.array([labels.index(stretch.label) for stretch in shown]),
+        np.array([stretch.intensity / 100 for stretch in shown], dtype=np.float32),
+        estimated=True,
+    )
 
 
 def _stretches(readings: Readings, begin: float, step: float) -> tuple[Stretch, ...]:

@@ -22,7 +22,8 @@ BUTTONS = ("left", "right", "middle")
 KEY_NAMES = {
     "SPACE": "space", "LEFT": "left", "RIGHT": "right", "UP": "up", "DOWN": "down", "HOME": "home",
     "END": "end", "ESCAPE": "esc", "ENTER": "enter", "TAB": "tab", "BACKSPACE": "backspace",
-    "DELETE": "delete", "KP_ADD": "+", "KP_SUBTRACT": "-", "EQUAL": "+", "MINUS": "-",
+    "DELETE": "delete", "PAGE_UP": "pageup", "PAGE_DOWN": "pagedown",
+    "KP_ADD": "+", "KP_SUBTRACT": "-", "EQUAL": "+", "MINUS": "-",
     **{f"F{number}": f"f{number}" for number in range(1, 13)},
     **{f"KP_{number}": str(number) for number in range(10)},
 }  # fmt: skip

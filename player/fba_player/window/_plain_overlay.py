@@ -1,4 +1,4 @@
-"""What a window draws with Pillow: its first picture; without imgui, a plain timeline and a help page.
+"""What a window without imgui draws with Pillow: a plain timeline and a help page.
 
 imgui-bundle has no wheels for Macs with Intel processors, nor for Python 3.15, where moderngl can be
 installed: the window then opens without panels (see the markers in pyproject.toml).
@@ -13,7 +13,7 @@ import numpy as np
 from fba_player.gl._resources import load_program
 from fba_player.session._controls import BAR_HEIGHT, Controls
 from fba_player.session._keys import keys
-from fba_player.view._font import label_font, shortened
+from fba_player.view._font import label_font
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -23,11 +23,6 @@ FAINT = (176, 183, 192, 255)
 ACCENT = (94, 176, 229, 255)
 SHADE = (18, 21, 26, 168)
 TRACK = (255, 255, 255, 54)
-OPENING_GREY = (118, 122, 127)
-OPENING_TEXT = (236, 238, 240)
-"""Colours of a window before its first picture, sRGB."""
-OPENING_TEXT_HEIGHT = 22.0
-"""Points."""
 
 
 class Overlay:
@@ -126,22 +121,3 @@ def help_picture(scale: float) -> Image:
         draw.text((x, y), row.shown, font=font, fill=TEXT)
         draw.text((x + 136 * scale, y), row.does, font=font, fill=FAINT)
     return picture
-
-
-def draw_opening(context: Any, size: tuple[int, int], text: str, scale: float = 1.0) -> None:
-    """Fill a window's framebuffer, without shaders, which take a while to be compiled.
-
-    context: of moderngl. size: of the framebuffer in pixels. text: shown in the middle, cut to the width.
-    scale: pixels per point.
-    """
-    from PIL import Image, ImageDraw
-
-    picture = Image.new("RGBA", size, (*OPENING_GREY, 255))
-    pen, font = ImageDraw.Draw(picture), label_font(OPENING_TEXT_HEIGHT * scale)
-    line = shortened(pen, text, font, size[0] * 0.9)
-    pen.text((size[0] / 2, size[1] / 2), line, font=font, fill=OPENING_TEXT, anchor="mm")
-    texture = context.texture(size, 4, np.ascontiguousarray(np.asarray(picture)[::-1]).tobytes())
-    filled = context.framebuffer([texture])
-    context.copy_framebuffer(context.screen, filled)
-    filled.release()
-    texture.release()

@@ -7,20 +7,14 @@ import shlex
 import time as wall
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaWarning
 from fba_player.export.render import film_rate
-from fba_player.gl._context import (
-    OPENGL,
-    cure,
-    how_to_install,
-    import_moderngl,
-    missing_libraries,
-    missing_text,
-)
+from fba_player.gl._context import cure, import_moderngl
 from fba_player.gl._framebuffer import Readback, Target
 from fba_player.gl._renderer import Renderer
 from fba_player.playback._transport import Transport
@@ -32,9 +26,10 @@ from fba_player.session._session import Session
 from fba_player.session._source import Source
 from fba_player.view._camera import Camera
 from fba_player.view.protocols import Closing
-from fba_player.window._display import HOW_WITHOUT, Covering, FullScreen, start_glfw
+from fba_player.window._display import Covering, FullScreen
 from fba_player.window._glfw_input import GlfwInput
-from fba_player.window._plain_overlay import Overlay, draw_opening
+from fba_player.window._plain_overlay import Overlay
+from fba_player.window.surface import Surface
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
@@ -51,6 +46,8 @@ USUAL_RATE = 60
 """Pictures a second of a display that does not say how many it shows."""
 LEAST_SHARE = 0.9
 """Least time from one picture to the next, in periods of the display, which may set the pace itself."""
+LOOK_SECONDS = 0.7
+"""Seconds between two looks at whether the file has changed on disk."""
 WARNING_SECONDS = 12.0
 """Seconds for which warnings about the file are shown."""
 SETTLING_PICTURES = 4
@@ -62,6 +59,8 @@ class Window(Closing):
 
     There can be one at a time, in the main thread. panels: False shows the plain timeline instead of panels,
     as it does if imgui is missing. folder: where pictures and films are saved; by default the current one.
+    surface: where it is shown, which stays open afterwards; by default a new one. follows_file: whether it
+    leaves the scene when the file has changed, so that it is shown again.
     """
 
     def __init__(
@@ -75,9 +74,10 @@ class Window(Closing):
         source: Source | None = None,
         panels: bool = True,
         folder: PathLike | None = None,
+        surface: Surface | None = None,
     ) -> None:
-        if size[0] < 1 or size[1] < 1:
-            raise ValueError(f"a window must have at least 1x1 pixels, not {size[0]}x{size[1]}")
+        self._surface = surface if surface is not None else Surface(size)
+        self._owned = surface is None
         timeline = scene.timeline
         self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=camera, size=size)
         self.captures = Captures(self.session, folder)
@@ -91,17 +91,20 @@ class Window(Closing):
         self._gui: Any = None
         self._gl: Any = None
         self._window: Any = None
-        self._problems: list[str] = []
+        self._glfw: Any = None
         self._pictures_due, self._restless = SETTLING_PICTURES, False
         self._next = self._least = 0.0
         self._covering: Covering | None = None
         self._timeline = timeline
         self._arrived = timeline.arrived
         self._doubted = False
+        self._looked = 0.0
+        self.follows_file = False
         self._last = wall.perf_counter()
-        self._glfw = start_glfw(self._problems)
         try:
-            self._open(size)
+            self._surface.open(self._title)
+            self._glfw, self._gl, self._window = self._surface.glfw, self._surface.gl, self._surface.window
+            self._prepare()
             self._make_panels(panels)
         except Exception:
             self.close()
@@ -124,11 +127,22 @@ class Window(Closing):
             self._doubted = True
             self.session.say(timeline.animation.doubt, "warning", WARNING_SECONDS)
 
+    def _look_for_changes(self, now: float) -> None:
+        """Leave the scene when its file has changed on disk."""
+        source = self.session.source
+        if not self.follows_file or now < self._looked + LOOK_SECONDS:
+            return
+        self._looked = now
+        if source.path is not None and source.changed():
+            self.session.reload(Path(source.path))
+            self._redraw()
+
     def update(self) -> bool:
         """Handle input and draw one picture, or wait if nothing moves. Returns False once closed."""
         glfw, session = self._glfw, self.session
         begun = wall.perf_counter()
         self._warn_of_bap_steps()
+        self._look_for_changes(begun)
         arrived = self._timeline.arrived  # a live stream makes the timeline longer, also while paused
         playing = session.transport.playing
         restless = session.restless or session.source.probing or arrived != self._arrived
@@ -150,7 +164,7 @@ class Window(Closing):
             return False
         if hidden or not self._pictures_due:
             return True
-        size = self._framebuffer()
+        size = self._surface.pixels
         if size[0] < 1 or size[1] < 1:  # minimised
             glfw.wait_events_timeout(HIDDEN_SECONDS)
             return True
@@ -198,61 +212,23 @@ class Window(Closing):
                 if part is not None:
                     part.close()
             self._covering = self._gui = self._overlay = self._renderer = self._target = self._readback = None
-            if self._gl is not None:
-                self._gl.release()
-                self._gl = None
-            if self._window is not None:
-                self._glfw.destroy_window(self._window)
-                self._window = None
-            self._glfw.terminate()
+            self._gl = self._window = None
+            if self._owned:
+                self._surface.close()
 
-    def _open(self, size: tuple[int, int]) -> None:
+    def _prepare(self) -> None:
+        """Prepare what draws."""
         glfw = self._glfw
-        moderngl = import_moderngl()
-        for hint, value in (
-            (glfw.CONTEXT_VERSION_MAJOR, 3),
-            (glfw.CONTEXT_VERSION_MINOR, 3),
-            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
-            (glfw.OPENGL_FORWARD_COMPAT, True),
-            (glfw.SCALE_TO_MONITOR, True),
-        ):
-            glfw.window_hint(hint, value)
-        self._window = glfw.create_window(*size, self._title, None, None)
-        if not self._window:
-            missing = missing_libraries()
-            if missing:
-                raise DisplayError(f"the window needs OpenGL, but {missing_text(missing)}")
-            raise DisplayError(
-                f"no window with OpenGL 3.3 can be opened: {self._reason('the display refused')}. "
-                "Install a driver (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri). "
-                + HOW_WITHOUT
-            )
-        glfw.make_context_current(self._window)
-        glfw.swap_interval(1)
+        glfw.set_window_should_close(self._window, False)
         self._covering = Covering(glfw, self._window)
         rates = [glfw.get_video_mode(monitor).refresh_rate for monitor in glfw.get_monitors()]
         self._least = LEAST_SHARE / max([*rates, USUAL_RATE])
-        try:
-            self._gl = moderngl.create_context(require=330)
-        except Exception as error:
-            raise DisplayError(
-                f"OpenGL 3.3 cannot be used in the window: {error}. {how_to_install(OPENGL)}, or update the "
-                "graphics driver"
-            ) from error
-        self._show_opening()
         self._renderer = Renderer(self._gl)
-
-    def _show_opening(self) -> None:
-        """Show something at once: until the first picture, shaders are compiled and meshes prepared."""
-        size = self._framebuffer()
-        if size[0] > 0 and size[1] > 0:
-            draw_opening(self._gl, size, f"Opening {self._title} ...", self._scale())
-            self._glfw.swap_buffers(self._window)
 
     def _make_panels(self, panels: bool) -> None:
         """Make the panels, or the plain timeline in their place, and connect the input."""
         session = self.session
-        session.size, session.scale = self._framebuffer(), self._scale()
+        session.size, session.scale = self._surface.pixels, self._surface.scale
         if panels:
             try:
                 from fba_player._ui.gui import Gui
@@ -273,17 +249,6 @@ class Window(Closing):
     def _redraw(self) -> None:
         self._pictures_due = SETTLING_PICTURES
 
-    def _reason(self, otherwise: str) -> str:
-        return self._problems[-1] if self._problems else otherwise
-
-    def _framebuffer(self) -> tuple[int, int]:
-        width, height = self._glfw.get_framebuffer_size(self._window)
-        return int(width), int(height)
-
-    def _scale(self) -> float:
-        """Return the pixels per point: 1 on normal displays, 2 on high-resolution ones."""
-        return min(max(float(self._glfw.get_window_content_scale(self._window)[0]), 0.5), 8.0)
-
     def _draw_checked(self, size: tuple[int, int]) -> None:
         """Draw a picture. Raises DisplayError on an unrecoverable OpenGL error."""
         try:
@@ -296,7 +261,7 @@ class Window(Closing):
 
     def _draw(self, size: tuple[int, int]) -> None:
         session = self.session
-        session.size, session.scale, session.full_screen = size, self._scale(), self._full_screen.active
+        session.size, session.scale, session.full_screen = size, self._surface.scale, self._full_screen.active
         session.viewpoint.aspect = size[0] / size[1]
         if self._target is None or self._target.size != size:
             if self._target is not None:

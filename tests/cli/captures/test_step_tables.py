@@ -49,7 +49,7 @@ def test_written_streams_are_read_with_the_right_table(
 ) -> None:
     """With the mark nothing has to be given; without it, the reminder is a command that works."""
     shown = []
-    monkeypatch.setattr(player, "play", lambda scene, **_: shown.append(scene.animation) or ())
+    monkeypatch.setattr(player, "play", lambda build, **_: shown.append(build().animation) or ())
     source, target = files_with_a_body(tmp_path)["bap"], tmp_path / "my walk.fba"
     for arguments in (("encode", source, "-o", target), ("convert", source, target), ("gait", "-o", target)):
         done = run(*arguments, "--bap-steps", "visage")
@@ -234,8 +234,8 @@ def test_a_picture_is_made_with_the_warning(
 
 
 def test_a_stream_that_arrives(run: Run, walk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def play(scene: Any, **_: Any) -> tuple[()]:
-        assert scene.animation.wait_end(20)
+    def play(build: Any, **_: Any) -> tuple[()]:
+        assert build().animation.wait_end(20)
         return ()
 
     class Stdin:

@@ -37,6 +37,7 @@ def errors(found: FoundPoints, true: Float64, unit: float) -> dict[str, float]:
     }
 
 
+@pytest.mark.slow
 def test_a_face_s_points_are_found(opengl: None) -> None:
     photograph, true = rendered(5.0)
     found = find_front_points(photograph)

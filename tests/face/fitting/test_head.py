@@ -17,6 +17,8 @@ from fba.mesh import read_pixels
 from fba.parameters import point_rows
 from fba.rotations import turn
 
+pytestmark = pytest.mark.slow
+
 SIZE = (600, 700)
 BASE = FaceModel.default()
 

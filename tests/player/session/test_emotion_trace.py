@@ -1,10 +1,11 @@
-"""The strip of expressions: where they begin and end on the timeline, and what is left out."""
+"""The lane of expressions that are felt: where they begin and end on the timeline, and what is left out."""
 
 from __future__ import annotations
 
 from itertools import pairwise
 
 import numpy as np
+import pytest
 
 from fba.animation import Animation
 from fba.emotion import Mood, emote
@@ -13,7 +14,7 @@ from fba.tracks import BodyTrack, FaceTrack
 from fba_player.scene.scene import Scene
 from fba_player.session import _timeline_trace as timeline_trace
 from fba_player.session._source import Source
-from fba_player.session._timeline_trace import read_stretches, stretch_at
+from fba_player.session._timeline_trace import lane_of_stretches, read_stretches
 
 
 def angry_for_a_while(first: int = 0) -> Animation:
@@ -34,8 +35,11 @@ def test_stretches_follow_each_other() -> None:
     assert abs(anger.end - 6.0) < 0.6
     assert 60 < anger.intensity <= 100
     assert str(anger) == f"anger {anger.intensity:.0f}"
-    assert stretch_at(found, 5.0) is anger
-    assert stretch_at(found, 8.5) is None
+    lane = lane_of_stretches(found)
+    assert lane is not None
+    assert lane.at(5.0) == [("anger", pytest.approx(anger.intensity / 100))]
+    assert lane.at(8.5) == []
+    assert lane_of_stretches(found[:1]) is None  # neutral
 
 
 def test_no_expressions_without_a_face_and_for_long_animations(monkeypatch: object) -> None:
@@ -51,6 +55,11 @@ def test_a_source_reads_them_in_the_background() -> None:
     assert source.expressions == ()
     source.probe(wait=True)
     assert [one.label for one in source.expressions] == ["neutral", "anger", "neutral"]
+    felt = source.lanes[-1]
+    assert (felt.name, felt.labels, felt.estimated) == ("felt", ("anger",), True)
+    assert felt.text(4.0 - 1.0) == str(source.expressions[1])
+    assert source.activity is not None
+    assert "brows" in source.activity.names
 
 
 def test_every_label_has_a_colour() -> None:
@@ -59,4 +68,4 @@ def test_every_label_has_a_colour() -> None:
     graphics.imported("imgui_bundle")
     from fba_player._ui import theme
 
-    assert set(theme.FEELINGS) == set(labels()) - {"neutral", "unknown"}
+    assert set(theme.HUES) == set(labels()) - {"neutral", "unknown"}

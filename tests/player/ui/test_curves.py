@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fba.animation import Animation, FaceTrack
-from fba.parameters import faps
+from fba.animation import Animation
+from fba.face import FaceModel
+from fba.parameters import bap_numbers, faps
+from fba.tracks import FaceTrack
 from fba_player._ui.panels._curve_data import (
-    MIN_SHOWN_SECONDS,
     RESOLVED_AT_ONCE,
     Courses,
-    TimeZoom,
     amount,
     envelope,
 )
@@ -123,32 +123,6 @@ def test_nothing_to_draw() -> None:
     assert not len(envelope(one, one, one == 0, 0, 0, 100).x)
 
 
-def test_zooming_keeps_the_time_under_the_mouse() -> None:
-    time_zoom = TimeZoom()
-    time_zoom.bound(10.0, 110.0)
-    assert time_zoom.shows_all
-    time_zoom.zoom(0.5, 35.0)
-    assert (time_zoom.low, time_zoom.high) == (22.5, 72.5)  # 35 is a quarter from the left, as before
-    time_zoom.pan(1000.0)
-    assert (time_zoom.low, time_zoom.high) == (60.0, 110.0)
-    time_zoom.follow(20.0)
-    assert (time_zoom.low, time_zoom.high) == (15.0, 65.0)
-    time_zoom.zoom(1e-9, 30.0)
-    assert time_zoom.high - time_zoom.low == pytest.approx(MIN_SHOWN_SECONDS)
-    time_zoom.zoom(1e9, 30.0)
-    assert time_zoom.shows_all
-
-
-def test_the_full_range_stays_full_while_a_stream_arrives() -> None:
-    time_zoom = TimeZoom()
-    time_zoom.bound(0.0, 10.0)
-    time_zoom.bound(0.0, 12.0)
-    assert (time_zoom.low, time_zoom.high) == (0.0, 12.0)
-    time_zoom.zoom(0.25, 0.0)
-    time_zoom.bound(0.0, 20.0)
-    assert (time_zoom.low, time_zoom.high) == (0.0, 3.0)
-
-
 @pytest.mark.parametrize(
     ("query", "check"),
     [
@@ -157,7 +131,7 @@ def test_the_full_range_stays_full_while_a_stream_arrives() -> None:
         ("48", lambda rows: rows == [("fap", 48), ("bap", 48)]),
         ("bap 48", lambda rows: rows == [("bap", 48)]),
         ("tongue", lambda rows: [n for _, n in rows] == [f.number for f in faps() if f.group == 6]),
-        ("L Knee", lambda rows: rows == [("bap", 10), ("bap", 12)]),
+        ("L Knee", lambda rows: rows[:-1] == [("bap", 10), ("bap", 12)] and rows[-1][0] == "joint"),
         ("no such thing", lambda rows: rows == []),
     ],
 )
@@ -166,5 +140,56 @@ def test_searching(query: str, check: Callable[[list[tuple[str, int]]], bool]) -
 
 
 def test_only_parameters_of_the_scene_are_listed() -> None:
-    assert {kind for kind, _, _ in search_parameters("", face=True, body=False)} == {"fap"}
-    assert {kind for kind, _, _ in search_parameters("", face=False, body=True)} == {"bap"}
+    assert {kind for kind, _, _ in search_parameters("", face=True, body=False)} == {
+        "fap", "viseme", "expression", "measure"
+    }  # fmt: skip
+    body = search_parameters("", face=False, body=True)
+    assert {kind for kind, _, _ in body} == {"bap", "measure", "joint"}
+    assert [text for kind, _, text in body if kind == "measure"] == ["speed over the ground"]
+
+
+def test_visemes_and_expressions_are_found_and_drawn() -> None:
+    found = search_parameters("viseme", face=True, body=False)
+    assert len(found) == 14
+    assert ("viseme", 10, "viseme A:") in found
+    assert search_parameters("viseme", face=False, body=True) == ()
+    assert [row[2] for row in search_parameters("expression joy", face=True, body=True)] == ["expression joy"]
+    mask = np.zeros((3, 68), dtype=bool)
+    viseme = np.zeros((3, 4), dtype=np.int16)
+    mask[[0, 2], 0], viseme[0, :3], viseme[2, :3] = True, (10, 1, 21), (1, 10, 63)
+    face = FaceTrack(np.zeros((3, 68), dtype=np.int32), mask, viseme)
+    courses = complete(Courses(Timeline(Animation(25, np.arange(3), face))))  # type: ignore[arg-type]
+    course = courses.course("viseme", 10)
+    assert course.values.tolist() == pytest.approx([100 / 3, 100 / 3, 0])
+    assert course.sent.tolist() == [True, False, True]
+    assert amount("viseme", 10, 33.4) == ("33", "%")
+
+
+def test_the_opening_of_mouth_and_eyes() -> None:
+    fapu = FaceModel.default().fapu
+    face = face_track([{4: 0, 5: 0, 19: 0, 21: 0}, {4: -100, 5: -200, 19: 1024, 21: 0}])
+    courses = complete(Courses(Timeline(Animation(25, np.arange(2), face))))  # type: ignore[arg-type]
+    mouth = courses.course("measure", 1)
+    assert mouth.values.tolist() == pytest.approx([0.0, 300 * fapu.MNS * 1000])
+    assert amount("measure", 1, 12.34) == ("12.3", "mm")
+    assert courses.course("measure", 3).values.tolist() == pytest.approx([100.0, 0.0])  # the left eye
+
+
+def test_the_angle_of_a_joint_and_the_speed() -> None:
+    quarter = round(np.pi / 2 * 1e5)
+    numbers = bap_numbers()
+    side, forward = numbers["HumanoidRoot_tr_lateral"], numbers["HumanoidRoot_tr_frontal"]
+    flexion, twist = numbers["l_shoulder_flexion"], numbers["l_shoulder_twisting"]
+    rows = [
+        {flexion: quarter * (t > 0), twist: quarter * (t > 1), side: 40 * t, forward: 30 * t}
+        for t in range(3)
+    ]
+    courses = complete(Courses(Timeline(Animation(25, np.arange(3), None, body_track(rows)))))  # type: ignore[arg-type]
+    joint = next(
+        row for row in search_parameters("angle l shoulder", face=True, body=True) if row[0] == "joint"
+    )
+    assert joint[2] == "angle of l_shoulder"
+    # two quarter turns about axes at right angles are a third of a turn about their diagonal
+    assert courses.course("joint", joint[1]).values.tolist() == pytest.approx([0, 90, 120], abs=0.01)
+    speed = search_parameters("speed", face=True, body=True)[0]
+    assert courses.course("measure", speed[1]).values.tolist() == pytest.approx([1.25] * 3)  # 50 mm in 1/25 s

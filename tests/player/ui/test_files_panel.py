@@ -13,6 +13,7 @@ import graphics
 from fba.animation import Animation
 from fba_player.scene.scene import Scene
 from fba_player.session import _exports
+from fba_player.session._memory import Memory
 from fba_player.session._session import Session
 
 graphics.imported("imgui_bundle")
@@ -83,3 +84,20 @@ def test_without_a_program_for_dialogs_it_says_so(studio: Studio, monkeypatch: p
     assert _exports.has_dialogs()
     monkeypatch.setattr(_exports.sys, "platform", "win32")
     assert _exports.has_dialogs()
+
+
+def test_a_file_that_was_shown_before_is_opened_from_the_list(
+    studio: Studio, talking: Animation, tmp_path: Path
+) -> None:
+    session, panel = studio.session, panel_of(studio)
+    assert "Recent..." not in panel.buttons  # nothing is remembered here
+    fba.write(tmp_path / "other.fba", talking)
+    session.memory = Memory(tmp_path / "settings")
+    session.memory.add("other.fba")
+    studio.settle(2)
+    hand = StudioHand(studio)
+    hand.click(*panel.buttons["Recent..."])
+    studio.settle(2)
+    hand.click(*panel.recent["other.fba"])
+    assert session.dropped == (tmp_path / "other.fba",)
+    assert session.closing

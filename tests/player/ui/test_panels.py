@@ -306,3 +306,131 @@ def test_it_rests_while_nothing_changes(studio: Studio, clock: Clock) -> None:
     assert not session.restless
     session.viewpoint.preset("profile")
     assert session.restless
+
+
+@pytest.fixture
+def speaking(opengl: None, tmp_path: Path, clock: Clock) -> Iterator[Studio]:
+    """Four seconds that send one viseme, then another, and joy that grows."""
+    mask = np.zeros((100, 68), dtype=bool)
+    mask[:, :2] = True
+    viseme, expression = np.zeros((100, 4), np.int16), np.zeros((100, 6), np.int16)
+    viseme[:, 0], viseme[50:, 0], viseme[:, 2] = 10, 1, 63
+    expression[:, 0], expression[:, 1] = 1, np.arange(100) * 63 // 99
+    face = fba.FaceTrack(np.zeros((100, 68), np.int32), mask, viseme, expression)
+    scene = Scene(Animation(25, np.arange(100), face, None, "speaking"))  # type: ignore[arg-type]
+    session = Session(scene, Transport(scene.timeline, clock=clock), size=SIZE, clock=clock)
+    session.source.probe(wait=True)
+    with Studio(session) as made:
+        made.draw(4)
+        yield made
+
+
+def lane_part(studio: Studio, name: str, low: float, high: float) -> np.ndarray:
+    """Pixels of a lane between two shares of its width."""
+    left, top, right, bottom = studio.gui.bar.lanes.areas[name]
+    wide = right - left
+    part = studio.draw(1)[
+        round(top) : round(bottom), round(left + low * wide) : round(left + high * wide), :3
+    ]
+    return part.astype(int)
+
+
+def test_lanes_show_what_is_said_and_felt(speaking: Studio) -> None:
+    from fba_player._ui import theme
+
+    areas = speaking.gui.bar.lanes.areas
+    assert list(areas)[:2] == ["visemes", "expressions"]
+    assert areas["visemes"][3] <= areas["expressions"][1] < speaking.gui.bar.area[1]
+    ground = np.median(lane_part(speaking, "expressions", 0.0, 0.02), axis=(0, 1))
+    for name, low in (("A:", 0.2), ("p b m", 0.7)):
+        colour = np.array(theme.name_colour(name)[:3]) * 255
+        seen = np.median(lane_part(speaking, "visemes", low, low + 0.2), axis=(0, 1))
+        assert np.abs(seen - (0.8 * colour + 0.2 * ground)).max() < 20
+    soft, strong = (lane_part(speaking, "expressions", low, low + 0.1) for low in (0.25, 0.85))
+    tall = [(np.abs(part - ground).sum(axis=2) > 60).mean() for part in (soft, strong)]
+    assert tall[0] == pytest.approx(0.3, abs=0.1)
+    assert tall[1] == pytest.approx(0.9, abs=0.1)
+
+
+def test_the_text_at_the_mouse_names_what_is_said(speaking: Studio) -> None:
+    text = speaking.gui.bar.lanes.text(speaking.session, 3.0)
+    assert text.startswith("visemes: p b m 100%   expressions: joy 47 of 63")
+    assert "moving" not in text
+    speaking.session.lanes = "all"
+    left, top, right, bottom = speaking.gui.bar.lanes.areas["visemes"]
+    before = speaking.draw(1).astype(int)
+    move(speaking, (left + right) / 2, (top + bottom) / 2)
+    changed = np.abs(speaking.draw(1).astype(int) - before).sum(axis=2) > 30
+    assert changed[: round(top) - 30].sum() > 2000
+
+
+def test_lanes_are_chosen_and_leave_room_for_the_figure(speaking: Studio) -> None:
+    from fba_player.session._actions import act
+
+    session, bar = speaking.session, speaking.gui.bar
+    with_content = bar.height(session, SIZE)
+    act(session, "lanes")
+    assert session.lanes == "all"
+    assert bar.height(session, SIZE) > with_content
+    speaking.settle(2)
+    assert list(bar.lanes.areas)[-1] == "groups"
+    act(session, "lanes")
+    assert bar.height(session, SIZE) < with_content
+    left = bar.area[0]
+    speaking.settle(2)
+    assert bar.area[0] < left  # without lanes, their names need no room
+    act(session, "lanes")
+    assert session.lanes == "content"
+    assert bar.height(session, (900, 380)) < with_content  # a low window has none
+    session.size = (900, 380)
+    speaking.draw(2)
+
+
+def test_a_drag_on_a_lane_seeks(speaking: Studio) -> None:
+    left, top, right, bottom = speaking.gui.bar.lanes.areas["expressions"]
+    drag(speaking, (left + 5, (top + bottom) / 2), ((left + right) / 2, (top + bottom) / 2))
+    assert speaking.session.transport.time == pytest.approx(1.98, abs=0.02)
+
+
+def test_the_wheel_enlarges_the_timeline_about_the_mouse(speaking: Studio) -> None:
+    session, zoom = speaking.session, speaking.session.zoom
+    camera = session.viewpoint.camera
+    move(speaking, *place(speaking, 0.25))
+    speaking.gui.io.add_mouse_wheel_event(0, 5)
+    speaking.settle(2)
+    assert zoom.high - zoom.low == pytest.approx(3.96 * 0.8**5)
+    assert zoom.low + 0.25 * (zoom.high - zoom.low) == pytest.approx(0.99, abs=0.02)
+    assert session.viewpoint.camera == camera
+    click(speaking, *place(speaking, 0.5))
+    assert session.transport.time == pytest.approx((zoom.low + zoom.high) / 2, abs=0.02)
+    low = zoom.low
+    speaking.gui.io.add_mouse_wheel_event(-1, 0)  # sideways
+    speaking.settle(2)
+    assert zoom.low == pytest.approx(low + 0.1 * (zoom.high - zoom.low), abs=0.01)
+    drag(speaking, place(speaking, 0.5), place(speaking, 0.75), 2)  # with the middle button
+    assert zoom.low < low
+    speaking.settle(1)
+    x, y = speaking.gui.bar.zoom_bar
+    drag(speaking, (x, y), (SIZE[0], y))
+    assert zoom.high == pytest.approx(3.96)
+
+
+def test_the_enlarged_timeline_follows_the_time_and_fits_again(speaking: Studio) -> None:
+    from fba_player.session._actions import act
+
+    session, zoom = speaking.session, speaking.session.zoom
+    for _ in range(3):
+        act(session, "zoom_in")
+    assert (zoom.low, zoom.high) == (0.0, pytest.approx(3.96 / 8))
+    session.transport.seek(3.0)
+    speaking.settle(1)
+    assert zoom.low < 3.0 < zoom.high
+    act(session, "page_back")
+    act(session, "page_back")
+    speaking.settle(1)
+    assert zoom.high < 3.0  # the user looks elsewhere
+    session.transport.step(1)
+    speaking.settle(1)
+    assert zoom.shows(session.transport.time)
+    act(session, "zoom_fit")
+    assert zoom.shows_all

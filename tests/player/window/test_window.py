@@ -79,7 +79,7 @@ def test_something_is_shown_before_anything_is_prepared(
     create = moderngl.create_context
     monkeypatch.setattr(moderngl, "create_context", lambda **how: made.append(create(**how)) or made[-1])
     with opened(talking, tmp_path, panels=False):
-        first, then = done[:2]
+        first, _, then = done[:3]  # before and after the window appears
     assert then == "prepared"
     assert isinstance(first, np.ndarray)
     assert 100 < np.median(first) < 150  # the grey of the studio
@@ -182,7 +182,7 @@ def test_minimised_it_waits_and_goes_on(window: Window, monkeypatch: pytest.Monk
         if how == "as X11 does":
             hide(window, minimised, glfw.ICONIFIED)
         else:
-            minimised.setattr(window, "_framebuffer", lambda: (0, 0))
+            minimised.setattr(type(window._surface), "pixels", property(lambda _: (0, 0)))
         for _ in range(3):
             assert window.update()
         assert window.pictures == before

@@ -1,38 +1,41 @@
-"""Data of curves: values of single FAPs and BAPs over all frames, and the range of time that is shown."""
+"""Data of curves: values of single FAPs and BAPs over all frames, and what follows from them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64
-from fba.face import FaceSettings, Resolver
-from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, bap_numbers, baps, faps
-from fba_player._ui.panels._puppet_rows import reach
+from fba.face import FaceModel, FaceSettings, Fapu, Resolver
+from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, baps, faps
+from fba_player._ui.panels._derived import KINDS as DERIVED
+from fba_player._ui.panels._derived import (
+    derived_unit,
+    joint_angle,
+    joint_columns,
+    measures,
+    selected_course,
+)
+from fba_player.session._reach import bap_reach, reach
 
 RESOLVED_AT_ONCE = 512
 """Frames of a face resolved at once: about two milliseconds."""
 FILLED_IN_WEIGHT = 0.5
 """Weight of a FAP that is only filled in, where 1 is that of a FAP that is sent."""
-TYPICAL_ANGLE = 45.0
-"""Degrees of a BAP that count as much as the typical motion of a FAP."""
-TYPICAL_SHIFT = 300.0
-"""Millimetres of a BAP that count as much."""
 
-MIN_SHOWN_SECONDS = 0.05
-"""Shortest range of time that is shown."""
-TIME_TOLERANCE = 1e-6
-"""Seconds within which two times are the same."""
+FACE_KINDS, BODY_KINDS = ("fap",), ("bap", "joint")
+"""Kinds of curves that stay valid when more frames of a body arrive, and when more of a face is resolved."""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
     """Values of one parameter over time.
 
-    kind: "fap" or "bap". times: seconds (T,). values (T,): as shown, in the unit of the parameter. sent (T,):
-    whether the frame sends the value itself.
+    kind: "fap", "bap", or that of a derived curve. times: seconds (T,). values (T,): as shown, in the unit of
+    the parameter. sent (T,): whether the frame sends the value itself, or one that it is derived from.
     """
 
     kind: str
@@ -53,6 +56,7 @@ class Courses:
         self._timeline = timeline
         self._later = later
         self._resolver = Resolver(model)
+        self._model = model
         self._shown: Float32 = np.zeros((0, FAP_COUNT), np.float32)
         self._done = 0
         self._times: Float64 = np.zeros(0)
@@ -79,7 +83,7 @@ class Courses:
         if frames != len(self._times):
             index = np.asarray(animation.index[:frames])
             self._times = index / float(timeline.rate) + self._later
-            self._courses = {key: course for key, course in self._courses.items() if key[0] == "fap"}
+            self._courses = {key: course for key, course in self._courses.items() if key[0] in FACE_KINDS}
         if animation.face is None:
             return False
         if len(self._shown) < frames:
@@ -91,14 +95,14 @@ class Courses:
             if stop > self._done:
                 self._shown[self._done : stop] = self._resolver.push(animation.face[self._done : stop])
                 self._done = stop
-        self._courses = {key: course for key, course in self._courses.items() if key[0] == "bap"}
+        self._courses = {key: course for key, course in self._courses.items() if key[0] in BODY_KINDS}
         return bool(self._done < frames)
 
     def course(self, kind: str, number: int) -> Course:
         """Return the course of a parameter as far as it is resolved; the same object until more is."""
         key = (kind, number)
         if key not in self._courses:
-            self._courses[key] = self._fap(number) if kind == "fap" else self._bap(number)
+            self._courses[key] = self._make(kind, number)
         return self._courses[key]
 
     def movers(self, count: int) -> list[tuple[str, int]]:
@@ -130,6 +134,29 @@ class Courses:
                 movers.append((kind, number))
         return movers[:count]
 
+    def _make(self, kind: str, number: int) -> Course:
+        if kind == "fap":
+            return self._fap(number)
+        if kind == "bap":
+            return self._bap(number)
+        if kind == "measure":
+            measure = measures()[number - 1]
+            parts = [self._make(measure.kind, column + 1) for column in measure.columns]
+            return _derive(kind, number, parts, lambda v: measure.compute(v, parts[0].times, self._fapu))
+        if kind == "joint":
+            parts = [self._bap(column + 1) for column in joint_columns(number)]
+            return _derive(kind, number, parts, lambda v: joint_angle(number, v))
+        face = self._timeline.animation.face
+        if face is None:
+            return Course(kind, number, np.zeros(0), np.zeros(0), np.zeros(0, bool))
+        selected = selected_course(face, self._done, kind, number)
+        return Course(kind, number, self._times[: self._done], *selected)
+
+    @property
+    def _fapu(self) -> Fapu:
+        model = self._model if isinstance(self._model, FaceModel) else FaceModel.default()
+        return model.fapu
+
     def _fap(self, number: int) -> Course:
         face, done = self._timeline.animation.face, self._done
         if face is None:
@@ -149,6 +176,13 @@ class Courses:
         return Course("bap", number, self._times, values, sent)
 
 
+def _derive(kind: str, number: int, parts: list[Course], compute: Callable[[Float64], Float64]) -> Course:
+    """Return a curve that follows from others, which are as long as each other."""
+    values = compute(np.stack([part.values for part in parts], axis=1))
+    sent = np.logical_or.reduce([part.sent for part in parts])
+    return Course(kind, number, parts[0].times, values, sent)
+
+
 def parameter(kind: str, number: int) -> Fap | Bap:
     """Return the table row of a parameter. kind: "fap" or "bap"."""
     return faps()[number - 1] if kind == "fap" else baps()[number - 1]
@@ -156,18 +190,14 @@ def parameter(kind: str, number: int) -> Fap | Bap:
 
 def amount(kind: str, number: int, value: float) -> tuple[str, str]:
     """Return (number, unit) of a value as text: angles in degrees, others as coded."""
+    if kind in DERIVED:
+        unit = derived_unit(kind, number)
+        digits = {"m/s": 2, "mm": 1, "deg": 1}.get(unit, 0)
+        return f"{value:.{digits}f}", unit
     row = parameter(kind, number)
     if row.unit in ("AU", "1e-5 rad"):
         return f"{np.degrees(value * 1e-5):.1f}", "deg"
     return f"{value:.0f}", "" if row.unit == "user defined" else row.unit
-
-
-def bap_reach(number: int) -> float:
-    """Return the typical strong motion of a BAP, in its unit."""
-    if baps()[number - 1].unit == "mm":
-        return TYPICAL_SHIFT
-    root = number >= bap_numbers()["HumanoidRoot_tr_vertical"]
-    return float(np.radians(TYPICAL_ANGLE * (2 if root else 1)) * 1e5)
 
 
 def _is_mate(kind: str, number: int, others: list[tuple[str, int]]) -> bool:
@@ -220,55 +250,3 @@ def envelope(times: Float64, values: Float64, sent: Bool, low: float, high: floa
     up = (np.arange(len(starts)) % 2).astype(bool)
     pairs = np.where(up, [largest, least], [least, largest]).T
     return Envelope(np.repeat((column_of + 0.5) / columns, 2), pairs.ravel(), np.repeat(any_sent, 2))
-
-
-class TimeZoom:
-    """The range of time that curves show: `low` to `high` in seconds, within `first` to `last`.
-
-    At first it is all; the mouse zooms and moves it.
-    """
-
-    def __init__(self) -> None:
-        self.first = self.last = self.low = self.high = 0.0
-
-    @property
-    def shows_all(self) -> bool:
-        return self.low <= self.first + TIME_TOLERANCE and self.high >= self.last - TIME_TOLERANCE
-
-    def bound(self, first: float, last: float) -> None:
-        """Set the full range; if all of it was shown, it still is."""
-        if (first, last) == (self.first, self.last):
-            return
-        everything = self.shows_all
-        self.first, self.last = first, max(last, first)
-        if everything:
-            self.reset()
-        else:
-            self._set(self.low, self.high)
-
-    def reset(self) -> None:
-        self.low, self.high = self.first, self.last
-
-    def zoom(self, factor: float, about: float) -> None:
-        """Show `factor` times as much; the time `about` stays where it is on the screen."""
-        self._set(about - (about - self.low) * factor, about + (self.high - about) * factor)
-
-    def pan(self, seconds: float) -> None:
-        """Move the range by seconds, within the full range."""
-        wide = self.high - self.low
-        low = min(max(self.low + seconds, self.first), max(self.last - wide, self.first))
-        self.low, self.high = low, low + wide
-
-    def follow(self, time: float) -> None:
-        """If a time lies outside, move on by a page: the time is then near the left edge."""
-        wide = self.high - self.low
-        if not self.low - TIME_TOLERANCE <= time <= self.high + TIME_TOLERANCE:
-            self.pan(time - wide * 0.1 - self.low)
-
-    def _set(self, low: float, high: float) -> None:
-        if high - low < MIN_SHOWN_SECONDS:
-            middle = (low + high) / 2
-            low, high = middle - MIN_SHOWN_SECONDS / 2, middle + MIN_SHOWN_SECONDS / 2
-        wide = min(high - low, self.last - self.first)
-        low = min(max(low, self.first), max(self.last - wide, self.first))
-        self.low, self.high = low, low + wide

@@ -10,9 +10,10 @@ import numpy as np
 from imgui_bundle import imgui
 
 from fba_player._ui import theme
-from fba_player._ui.panels._curve_data import Course, Envelope, TimeZoom, envelope
+from fba_player._ui.panels._curve_data import Course, Envelope, envelope
 from fba_player._ui.panels.panel import EITHER_BUTTON, shorten
 from fba_player._ui.ruler import Ruler, label
+from fba_player.playback._time_zoom import TimeZoom
 from fba_player.playback._timeline import clock_text
 from fba_player.session._session import Session
 

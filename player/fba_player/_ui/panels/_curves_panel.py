@@ -1,4 +1,4 @@
-"""F5: the panel of curves of chosen FAPs and BAPs."""
+"""F5: the panel of curves: chosen FAPs and BAPs, visemes and expressions, and what follows from them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ from collections.abc import Sequence
 from functools import cache, partial
 from typing import Any
 
+import numpy as np
 from imgui_bundle import imgui
 
 from fba.parameters import BAP_STANDARD_COUNT, FIRST_LOW_LEVEL_FAP, Bap, Fap, baps, faps
 from fba_player._ui import theme
-from fba_player._ui.panels._curve_data import Courses, TimeZoom, amount, parameter
+from fba_player._ui.panels._curve_data import Course, Courses, amount, parameter
 from fba_player._ui.panels._curve_plot import COLOURS, Lane, Lanes
+from fba_player._ui.panels._derived import KINDS as DERIVED
+from fba_player._ui.panels._derived import derived_name, derived_numbers, derived_unit
 from fba_player._ui.panels.panel import Panel, choose_name, tooltip
+from fba_player.playback._time_zoom import TimeZoom
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
@@ -52,17 +56,18 @@ class CurvesPanel(Panel):
             self.which = choose_name("##which", names, min(self.which, len(names) - 1))
         all_courses = self._update_courses(session)
         timeline = session.scene.timeline
+        self.time_zoom = session.zoom
         self.time_zoom.bound(session.transport.start, float(timeline.time_of(timeline.frames - 1)))
         self._tools(session, all_courses)
-        chosen = [("fap", n) for n in session.selection.faps] + [("bap", n) for n in session.selection.baps]
+        chosen = session.selection.all
         if not chosen:
             imgui.dummy((0, 6))
-            imgui.text_colored(theme.FAINT, "Choose FAPs or BAPs, or show those that move most.")
+            imgui.text_colored(theme.FAINT, "Choose parameters, or show those that move most.")
             return
         courses = [all_courses.course(kind, number) for kind, number in chosen]
         if [lane.course for lane in self._lanes] != courses:
             self._lanes = [_lane(course, number) for number, course in enumerate(courses)]
-        self.lanes.draw(session, self._lanes, self.time_zoom, _now(session, chosen, self.which))
+        self.lanes.draw(session, self._lanes, self.time_zoom, _now(session, courses, self.which))
 
     def closed(self, session: Session) -> None:
         session.rolling.discard(self.name)
@@ -82,19 +87,19 @@ class CurvesPanel(Panel):
             session.rolling.discard(self.name)
         if not self._movers_chosen and self._courses.resolved_share >= 1.0:
             self._movers_chosen = True
-            if not (session.selection.faps or session.selection.baps):
-                _choose(session, self._courses.movers(BEGINS_WITH))
+            if not session.selection.all:
+                session.selection.choose(self._courses.movers(BEGINS_WITH))
         return self._courses
 
     def _tools(self, session: Session, courses: Courses) -> None:
         self.chooser.draw(session, face=courses.has_face, body=courses.has_body)
         imgui.same_line()
         if imgui.button("Most moving"):
-            _choose(session, courses.movers(MOVERS))
+            session.selection.choose(courses.movers(MOVERS))
         tooltip(f"the {MOVERS} that move most")
         imgui.same_line()
         if imgui.button("None"):
-            _choose(session, [])
+            session.selection.choose([])
         if courses.resolved_share < 1.0:
             imgui.same_line()
             imgui.text_colored(theme.FAINT, f"{courses.resolved_share:.0%}")
@@ -113,30 +118,36 @@ def _timeline(session: Session, which: int = 0) -> Any:
     return scene.timeline if isinstance(scene, Scene) else None
 
 
-def _choose(session: Session, chosen: list[tuple[str, int]]) -> None:
-    session.selection.faps = [number for kind, number in chosen if kind == "fap"]
-    session.selection.baps = [number for kind, number in chosen if kind == "bap"]
+def _lane(course: Course, number: int) -> Lane:
+    kind = course.kind
+    if kind in DERIVED:
+        title = derived_name(kind, course.number)
+    else:
+        title = f"{course.number} {parameter(kind, course.number).name}"
+    write = partial(amount, kind, course.number)
+    return Lane(course, title, write, COLOURS[number % len(COLOURS)])
 
 
-def _lane(course: Any, number: int) -> Lane:
-    row = parameter(course.kind, course.number)
-    write = partial(amount, course.kind, course.number)
-    return Lane(course, f"{row.number} {row.name}", write, COLOURS[number % len(COLOURS)])
-
-
-def _now(session: Session, chosen: list[tuple[str, int]], which: int) -> dict[tuple[str, int], float]:
-    """Return the current values of parameters, after the hooks."""
-    kinds = {kind for kind, _ in chosen}
+def _now(session: Session, courses: list[Course], which: int) -> dict[tuple[str, int], float]:
+    """Return the current values of curves; of FAPs and BAPs after the hooks."""
+    kinds = {course.kind for course in courses}
+    time = session.transport.time
+    values = {
+        (course.kind, course.number): float(np.interp(time, course.times, course.values))
+        for course in courses
+        if course.kind in DERIVED and len(course.times)
+    }
     if session.before_frame:
         faps, baps = session.values
     else:
         shown_timeline: Any = session.scene.timeline
-        timeline, time = _timeline(session, which), session.transport.time
+        timeline = _timeline(session, which)
         if timeline is not shown_timeline:
             time = shown_timeline.own_time(which, time)
         faps = timeline.faps(time) if "fap" in kinds else session.values[0]
         baps = timeline.baps(time) if "bap" in kinds else session.values[1]
-    return {(kind, n): float((faps if kind == "fap" else baps)[n - 1]) for kind, n in chosen}
+    rows = [(course.kind, course.number) for course in courses if course.kind not in DERIVED]
+    return values | {(kind, n): float((faps if kind == "fap" else baps)[n - 1]) for kind, n in rows}
 
 
 @cache
@@ -155,12 +166,17 @@ def all_parameters() -> tuple[tuple[str, int, str, str], ...]:
 
 @cache
 def search_parameters(query: str, *, face: bool, body: bool) -> tuple[tuple[str, int, str], ...]:
-    """Return (kind, number, text) of parameters that match all words: a number, or parts of name or group."""
+    """Return (kind, number, text) of curves that match all words: a number, or parts of name or group."""
     words = query.lower().split()
+    present = {"fap": face, "bap": body}
+    rows = [row for row in all_parameters() if present[row[0]]]
+    for kind, number in derived_numbers(face=face, body=body):
+        name = derived_name(kind, number)
+        rows.append((kind, number, name, f"{name.replace('_', ' ')} {name} {kind} curve".lower()))
     return tuple(
         (kind, number, text)
-        for kind, number, text, searched in all_parameters()
-        if (face if kind == "fap" else body) and all(_matches(word, number, searched) for word in words)
+        for kind, number, text, searched in rows
+        if all(_matches(word, number if kind in present else 0, searched) for word in words)
     )
 
 
@@ -201,8 +217,8 @@ class Chooser:
         clipper.begin(len(rows))
         while clipper.step():
             for kind, number, text in rows[clipper.display_start : clipper.display_end]:
-                on = number in (selection.faps if kind == "fap" else selection.baps)
-                full = len(selection.faps) + len(selection.baps) >= MAX_CURVES
+                on = (kind, number) in selection.all
+                full = len(selection.all) >= MAX_CURVES
                 changed, _ = imgui.checkbox(f"{text}##{kind}{number}", on)
                 if (kind, number, text) == rows[0]:
                     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
@@ -218,9 +234,11 @@ class Chooser:
 
 
 def _group(kind: str, number: int) -> None:
-    """Draw the kind and group of a parameter at the right end of its row."""
-    name = parameter(kind, number).group_name.partition(",")[0]
-    text = f"{kind.upper()} {name}"
+    """Draw the kind and group of a curve at the right end of its row."""
+    if kind in DERIVED:
+        text = derived_unit(kind, number)
+    else:
+        text = f"{kind.upper()} {parameter(kind, number).group_name.partition(',')[0]}"
     font, size = imgui.get_font(), theme.SMALL
     right = imgui.get_window_pos().x + imgui.get_content_region_avail().x
     wide = imgui.calc_text_size(text).x * size / imgui.get_font_size()

@@ -42,6 +42,8 @@ class FilesPanel(Panel):
         self._dialog: tuple[str, Any] | None = None
         self.buttons: dict[str, tuple[float, float]] = {}
         """Centres of buttons by name, in points; for tests."""
+        self.recent: dict[str, tuple[float, float]] = {}
+        """Centres of recent files by name."""
 
     def draw(self, session: Session) -> None:
         """Draw the content."""
@@ -51,6 +53,7 @@ class FilesPanel(Panel):
         if (self._button("Open file") or entered) and self._opened:
             session.drop((Path(self._opened).expanduser(),))
         tooltip("show another file in the window")
+        self._draw_recent(session)
         heading("Export")
         animation: Any = getattr(session.scene, "animation", None)
         if isinstance(animation, LiveAnimation):
@@ -88,6 +91,28 @@ class FilesPanel(Panel):
                 imgui.progress_bar(export.share, (-1, 0), text)
         if not has_dialogs():
             wrapped(NO_DIALOGS, theme.FAINT)
+
+    def _draw_recent(self, session: Session) -> None:
+        """Draw a list of the files that were shown before; a click opens one."""
+        source = session.source.path
+        shown = None if source is None else Path(source).absolute()
+        recent = [
+            path for path in (session.memory.recent if session.memory is not None else ()) if path != shown
+        ]
+        if not recent:
+            return
+        imgui.same_line()
+        if self._button("Recent..."):
+            imgui.open_popup("recent")
+        tooltip("files that were shown before")
+        if not imgui.begin_popup("recent"):
+            return
+        for number, path in enumerate(recent):
+            if imgui.selectable(f"{path.name}##{number}", False)[0]:
+                session.drop((path,))
+            self.recent[path.name] = _centre()
+            tooltip(str(path))
+        imgui.end_popup()
 
     def _options(self, session: Session, *, part: bool, suffix: str) -> ExportOptions:
         """Return the options of the export as they are chosen now."""
@@ -153,9 +178,14 @@ class FilesPanel(Panel):
 
     def _button(self, text: str) -> bool:
         pressed = imgui.button(text)
-        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-        self.buttons[text.rpartition("###")[2]] = ((low.x + high.x) / 2, (low.y + high.y) / 2)
+        self.buttons[text.rpartition("###")[2]] = _centre()
         return bool(pressed)
+
+
+def _centre() -> tuple[float, float]:
+    """Return the centre of the last item, in points."""
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    return (low.x + high.x) / 2, (low.y + high.y) / 2
 
 
 def _holds(animation: Any, suffix: str) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
 from fba.text_files import packaged_rows
+from fba_player.session._reach import reach
 
 RANGE_FACTOR = 1.5
 """Range of a FAP's slider relative to the value that the gallery shows."""
@@ -66,13 +67,6 @@ def groups() -> tuple[Group, ...]:
         rows = _fap_rows(names) if line["kind"] == "fap" else _bap_rows(names)
         groups.append(Group(line["group"], line["kind"], rows))
     return tuple(groups)
-
-
-@cache
-def reach(number: int) -> float:
-    """Return the amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
-    rows = packaged_rows("fba_player.export", "contact_sheet.csv")
-    return next(abs(float(row["value"])) for row in rows if int(row["fap"]) == number)
 
 
 def _fap_rows(names: list[str]) -> tuple[Row, ...]:

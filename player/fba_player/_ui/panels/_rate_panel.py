@@ -15,10 +15,11 @@ from fba.codec import StreamInfo, probe_stream
 from fba.compiled import is_compiled
 from fba.errors import FbaError
 from fba_player._ui import theme
-from fba_player._ui.panels._curve_data import Course, TimeZoom
+from fba_player._ui.panels._curve_data import Course
 from fba_player._ui.panels._curve_plot import CURVE_HEIGHT, LABEL_HEIGHT, Lane, Lanes
 from fba_player._ui.panels.panel import Panel, tooltip
 from fba_player._ui.ruler import Ruler
+from fba_player.playback._time_zoom import TimeZoom
 from fba_player.playback._timeline import clock_text
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
@@ -152,7 +153,7 @@ class RatePanel(Panel):
             imgui.text_colored(theme.FAINT, "There are no planes.")
             return
         transport = session.transport
-        self.time_zoom.bound(transport.start, max(float(rates.times[-1]), transport.start))
+        self.time_zoom = session.zoom
         high = BARS_HEIGHT + 6 + imgui.get_text_line_height_with_spacing() * 2.5
         imgui.begin_child(
             "rate", (0, max(imgui.get_content_region_avail().y - high, LABEL_HEIGHT + CURVE_HEIGHT + 24))

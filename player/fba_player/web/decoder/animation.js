@@ -1,9 +1,11 @@
 /** Whole streams. */
+import { partsOf } from "./frames.js";
 import { commonTimes } from "./clock.js";
 import { FbaError } from "./errors.js";
-import { partsOf } from "./frames.js";
-import { findMarks } from "./marks.js";
+import { text, value } from "./fraction.js";
 import { Decoder, NO_END, bytesOf } from "./stream.js";
+
+/** The decoded frames of a stream. @typedef {ReturnType<typeof decode>} Animation */
 
 /**
  * Return the animation of a complete stream. Throws FbaError for damage (unless salvaging), for streams without a plane,
@@ -12,54 +14,39 @@ import { Decoder, NO_END, bytesOf } from "./stream.js";
  * @param {import("./stream.js").Options} [options]
  */
 export function decode(data, options = {}) {
-  return new Animation(bytesOf(data), options);
-}
-
-/** The decoded frames of a stream. */
-export class Animation {
-  /** @param {Uint8Array} bytes @param {import("./stream.js").Options} options */
-  constructor(bytes, options) {
-    const decoder = new Decoder(options);
-    if (!options.bapSteps) decoder._objects._marks = findMarks(bytes);
-    decoder._clock._mayStepBack = true;
-    const planes = decoder._readAll(bytes);
+  const decoder = new Decoder(options, bytesOf(data));
+  const { damage, warnings, mark } = decoder;
+  const [planes, wrong, open] = /** @type {import("./stream.js").Whole} */ (decoder._whole);
+  if (!planes.length) throw new FbaError("damage", "no plane can be decoded", 0, undefined, damage[0]?.error.message);
+  if (!options.salvage && open) warnings.push(`plane ${planes.length - 1}: ${NO_END}`);
+  const [rate, index] = commonTimes(planes);
+  const [numerator, denominator] = rate;
+  const kept = keptPlanes(index, wrong);
+  const indices = Float64Array.from(kept, (at) => index[at]);
+  const time = (/** @type {number} */ at) => (indices[at] * Number(denominator)) / Number(numerator);
+  return {
     /** What was lost, when salvaging. */
-    this.damage = decoder.damage;
-    if (!planes.length) {
-      const cause = this.damage[0]?.error.message ?? "";
-      throw new FbaError("damage", "the stream holds no plane that can be decoded", 0, undefined, cause);
-    }
+    damage,
     /** What is odd in the stream. */
-    this.warnings = decoder.warnings;
-    if (!options.salvage && decoder._objects._endCode === null) this.warnings.push(`plane ${planes.length - 1}: ${NO_END}`);
+    warnings,
     /** The table of BAP steps that the stream's mark names, or null. */
-    this.mark = decoder.mark;
-    const { rate, index } = commonTimes(planes);
+    mark,
     /** Frames per second, an exact fraction. */
-    this.rate = rate;
-    const kept = keptPlanes(index, decoder._wrong);
-    this._planes = kept.map((at) => planes[at]);
+    rate: { numerator, denominator, valueOf: () => value(rate), toString: () => text(rate) },
     /** Number of each frame at `rate`, rising: frames that are skipped have none. */
-    this.index = Float64Array.from(kept, (at) => index[at]);
-    this.hasFace = planes.some((plane) => plane.face);
-    this.hasBody = planes.some((plane) => plane.body);
-  }
-
-  /** Number of frames. */
-  get length() {
-    return this.index.length;
-  }
-
-  /** Return the seconds at which a frame is shown. @param {number} at */
-  time(at) {
-    return (this.index[at] * Number(this.rate.denominator)) / Number(this.rate.numerator);
-  }
-
-  /** Return a frame. @param {number} at from 0 @returns {import("./frames.js").Frame} */
-  frame(at) {
-    if (!(at in this._planes)) throw new RangeError(`frame ${at} of ${this.length}`);
-    return { index: this.index[at], time: this.time(at), ...partsOf(this._planes[at]) };
-  }
+    index: indices,
+    hasFace: planes.some((plane) => plane._face),
+    hasBody: planes.some((plane) => plane._body),
+    /** Number of frames. */
+    length: kept.length,
+    /** Return the seconds at which a frame is shown. */
+    time,
+    /** Return a frame. @param {number} at from 0 @returns {import("./frames.js").Frame} */
+    frame(at) {
+      if (!(at in kept)) throw new RangeError(`frame ${at} of ${kept.length}`);
+      return { index: indices[at], time: time(at), ...partsOf(planes[kept[at]]) };
+    },
+  };
 }
 
 /**
@@ -70,13 +57,13 @@ export class Animation {
 function keptPlanes(index, wrong) {
   /** @type {number[]} */
   const kept = [];
-  for (let at = index.length - 1, later = Infinity; at >= 0; at -= 1) {
+  for (let at = index.length, later = Infinity; at--; ) {
     if (index[at] < later) kept.push(at);
     later = Math.min(later, index[at]);
   }
   kept.reverse();
-  const isWrong = new Uint8Array(index.length);
-  for (const [first, stop] of wrong) isWrong.fill(1, first, stop);
-  const right = kept.filter((at) => !isWrong[at]);
+  const marked = index.slice();
+  for (const [first, stop] of wrong) marked.fill(NaN, first, stop);
+  const right = kept.filter((at) => marked[at] >= 0);
   return right.length ? right : kept;
 }

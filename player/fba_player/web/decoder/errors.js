@@ -1,5 +1,8 @@
 /** The kinds of errors: of the stream, of what is not supported, of a limit, of an argument. @typedef {"damage" | "unsupported" | "limit" | "option"} Kind */
 
+/** @type {{[kind: string]: string | undefined}} */
+const REMEDIES = { damage: "the option salvage reads on", limit: "raise it" };
+
 /** A stream, or an argument, that cannot be used: the message says where, what was found, and what helps. */
 export class FbaError extends Error {
   /**
@@ -9,11 +12,8 @@ export class FbaError extends Error {
    * @param {number} [bit] from the start of the stream
    * @param {string} [remedy]
    */
-  constructor(kind, finding, plane, bit, remedy = kind === "damage" ? "the option salvage reads on behind it" : "") {
-    const where = [];
-    if (plane !== undefined) where.push(`plane ${plane}`);
-    if (bit !== undefined) where.push(`bit ${bit} (byte ${Math.floor(bit / 8)})`);
-    super((where.length ? `${where.join(", ")}: ` : "") + finding + (remedy && `; ${remedy}`));
+  constructor(kind, finding, plane, bit, remedy = REMEDIES[kind] ?? "") {
+    super((plane === undefined ? "" : `plane ${plane}, bit ${bit ?? 0}: `) + finding + (remedy && `; ${remedy}`));
     this.name = "FbaError";
     this.kind = kind;
     this.finding = finding;

@@ -1,5 +1,7 @@
 /** What users get of a plane. */
 import { FIRST_BAP, FIRST_FAP, FLAGS, SLOTS } from "./parameters.js";
+import { timeIn } from "./clock.js";
+import { value } from "./fraction.js";
 
 /**
  * The FAPs of a frame. values: FAPs 3 to 68 at 2 to 67, in the standard's units. mask: which of the 68 are sent.
@@ -19,23 +21,28 @@ import { FIRST_BAP, FIRST_FAP, FLAGS, SLOTS } from "./parameters.js";
  */
 
 /** Return the face and the body of a plane. @param {import("./planes.js").Plane} plane */
-export function partsOf({ face, body, row }) {
-  const values = new Int32Array(body ? SLOTS : FLAGS);
+export function partsOf({ _face: face, _body: body, _row: row }) {
+  const values = new Int32Array(body ? SLOTS : FIRST_BAP);
   let at = 0;
-  for (const part of [face, body]) for (const slot of part?.slots ?? []) values[slot] = row[at++];
-  const viseme = [...values.subarray(0, 3), row[at]];
-  const expression = [...values.subarray(3, FIRST_FAP), row[at + 1], row[at + 2]];
-  const faps = values.subarray(FIRST_FAP - 2, FLAGS).fill(0, 0, 2);
+  for (const part of [face, body]) for (const slot of part?._slots ?? []) values[slot] = row[at++];
+  const [select1, select2, blend, ...expression] = values.subarray(0, FIRST_FAP);
+  const [visemeDef, ...expressionFlags] = row.subarray(at);
   return {
-    face: face && { values: faps, mask: face.mask, interpolated: face.interpolated, viseme, expression },
-    body: body && { values: values.subarray(FIRST_BAP), mask: body.mask },
+    face: face ? {
+      values: values.subarray(FIRST_FAP - 2, FLAGS).fill(0, 0, 2),
+      mask: face.mask,
+      interpolated: face.interpolated,
+      viseme: [select1, select2, blend, visemeDef],
+      expression: [...expression, ...expressionFlags],
+    } : null,
+    body: body ? { values: values.subarray(FIRST_BAP), mask: body.mask } : null,
   };
 }
 
 /** @param {import("./stream.js").StreamPlane} plane @returns {StreamFrame} */
-export function streamFrame(plane) {
-  const { index, span, number, bit, stop, intra, doubtful } = plane;
-  const time = span._time(index).valueOf();
-  const [bits, rate] = [stop - bit, span._rate.valueOf()];
-  return { index, time, ...partsOf(plane), plane: number, bit, bits, intra, doubtful, rate };
-}
+export const streamFrame = (plane) => ({
+  ...plane._shown,
+  time: value(timeIn(plane._span, plane._shown.index)),
+  rate: value(plane._span[0]),
+  ...partsOf(plane),
+});

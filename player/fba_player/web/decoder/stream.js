@@ -1,31 +1,41 @@
 /** Reads a stream that arrives in pieces: outside of an object, plane by plane, and past damage. */
-import { Bits, END, Fault, LAYER_CODES, OBJECT_CODES, OUT_OF_DATA, PLANE_CODES, USER_DATA, findCode, hex } from "./bits.js";
-import { Clock } from "./clock.js";
-import { DamageLog } from "./damage.js";
+import { END, OBJECT_ENDS, OUT_OF_DATA, SEQUENCE, USER_DATA, codeAt, findCode, isObject, isPlane, takeStartCode } from "./bits.js";
+import { makeClock } from "./clock.js";
 import { FbaError } from "./errors.js";
 import { streamFrame } from "./frames.js";
-import { PeriodChecks, bytesNeeded } from "./marks.js";
-import { ObjectBorders } from "./objects.js";
-import { PlaneReader } from "./planes.js";
-import { BAP_STEPS } from "./tables.js";
+import { bytesNeeded, crc32, findMarks, isTable, otherSteps, readMark, writtenCheck } from "./marks.js";
+import { planeReader } from "./planes.js";
 
 /**
  * A plane in the stream, where it has a number. bit: of the start code before it, if there is one.
- * @typedef {import("./planes.js").Plane & {number: number, index: number, span: import("./clock.js").Span}} StreamPlane
+ * @typedef {import("./planes.js").Plane & {_span: import("./clock.js").Span,
+ *   _shown: {plane: number, bits: number, index: number}}} StreamPlane
  */
 
-export const NO_END = "no end code 00 00 01 b1: the stream may be cut off behind this plane";
-const NO_START = "no object start code 00 00 01 ba";
-const SMALLEST = 4096; // bytes of the buffer, and those beyond which an incomplete plane is not tried with every byte
+export const NO_END = "no end code 00 00 01 b1";
+const NO_START = "no start code 00 00 01 ba";
+const LONG = 4096; // bytes that are kept anyway, and those beyond which an incomplete plane is not tried with every byte
 const DAMAGE_BYTES = 1000; // memory of a damage with its error
 const PLANE_BYTES = 500; // memory of a plane without its values
 const GROWTH = 20; // bytes of memory that each byte of the input may take besides `mostBytes`
+const DOUBTFUL = 8; // planes before damage that may have been misread
+const MOST_PERIODS = 1 << 18; // that are checked: three days with an I plane every second
 
 /**
  * bapSteps: the stream's table of BAP steps; by default that which its mark names, "iso" without a mark. salvage: go on
  * behind damage, which `damage` lists. mostFrames, mostBytes: limits of what a stream, or a piece pushed, may become, the
  * latter besides 20 bytes for each byte of it.
  * @typedef {{bapSteps?: import("./parameters.js").BapSteps, salvage?: boolean, mostFrames?: number, mostBytes?: number}} Options
+ *
+ * Damage that was skipped. start, stop: lost bytes of the stream. framesLost: frame periods that no plane fills, and
+ * by how many that may be wrong; null if nothing says so. doubtful: planes that were returned and may be wrong, as the
+ * number of the first and of that behind the last; null without any.
+ * @typedef {{error: FbaError, start: number, stop: number, framesLost: number | null,
+ *   uncertainty: number | null, doubtful: [number, number] | null}} Damage
+ *
+ * What a complete stream holds: planes; those of I periods that do not match their checks, as the number of the first and
+ * of that behind the last; whether nothing ended the last object.
+ * @typedef {[StreamPlane[], [number, number][], boolean]} Whole
  */
 
 /** @param {Uint8Array | ArrayBuffer} data */
@@ -37,397 +47,514 @@ export function bytesOf(data) {
 
 /** Decodes a stream that arrives in pieces of any size, down to a byte. */
 export class Decoder {
-  /** @param {Options} [options] without bapSteps, a mark before the object names the table, "iso" without one */
-  constructor(options = {}) {
-    const { bapSteps, salvage = false, mostFrames = 6e6, mostBytes = 1e8 } = options;
-    if (bapSteps !== undefined && !Object.hasOwn(BAP_STEPS, bapSteps)) {
-      throw new FbaError("option", `bapSteps is ${JSON.stringify(bapSteps)}, expected "iso" or "visage"`);
-    }
-    this._salvage = salvage;
-    this._limits = { mostFrames, mostBytes };
-    this._log = new DamageLog();
-    /** Damage so far, when salvaging. */
-    this.damage = this._log.damage;
-    /** What is odd in the stream so far. @type {string[]} */
-    this.warnings = [];
-    /** The error that ended the reading. @type {FbaError | null} */
-    this._error = null;
-    this._finished = false;
-    this._planes = 0;
-    this._clock = new Clock(salvage ? this._log : null);
-    this._objects = new ObjectBorders(bapSteps);
-    /** Planes of I periods that do not match their checks: first, and behind the last. @type {[number, number][]} */
-    this._wrong = [];
-    this._wasAtEnd = false; // whether the bytes behind an end were being read, behind damage
-    this._checks = new PeriodChecks();
-    this._reader = new PlaneReader();
-    this._data = new Uint8Array(SMALLEST);
-    this._length = 0; // bytes in the buffer
-    this._offset = 0; // bytes that were dropped before them
-    this._bit = 0; // next bit to decode, in the buffer
-    this._scanned = 0; // byte up to which no start code was found, while looking for one
-    this._retryAt = 0; // length of the buffer at which an incomplete plane is tried again
-    this._state = this._findObject;
-    /** @type {FbaError | null} */
-    this._startError = null;
-    this._lostFrom = 0;
-    /** @type {number | null} */
-    this._codeBit = null; // where the start code before the next plane begins, in the stream
-  }
-
-  /** The table of BAP steps that a mark names, or null. */
-  get mark() {
-    return this._objects._mark;
-  }
-
-  /** Whether an end code closed the last object. */
-  get ended() {
-    return this._objects._endCode === END;
-  }
-
   /**
-   * Add bytes; return the frames that they complete. At damage, the frames before it are returned, and the next call
-   * throws the error.
-   * @param {Uint8Array | ArrayBuffer} data
+   * @param {Options} [options] without bapSteps, a mark before the object names the table, "iso" without one
+   * @param {Uint8Array} [whole] the complete stream, where `decode` calls it
    */
-  push(data) {
-    const bytes = bytesOf(data);
-    if (this._finished) throw new FbaError("option", "this decoder is finished; make a new one");
-    this._append(bytes);
-    return this._frames(false);
-  }
+  constructor({ bapSteps, salvage = false, mostFrames = 6e6, mostBytes = 1e8 } = {}, whole) {
+    if (bapSteps !== undefined && !isTable(bapSteps)) throw new FbaError("option", "bapSteps: expected iso or visage");
+    /** What is odd in the stream so far. @type {string[]} */
+    const warnings = (this.warnings = []);
+    /** Damage so far, when salvaging. @type {Damage[]} */
+    const damage = (this.damage = []);
+    /** The table of BAP steps that a mark names, or null. @type {import("./parameters.js").BapSteps | null} */
+    this.mark = null;
+    /** Whether an end code closed the last object. */
+    this.ended = false;
 
-  /** Return the planes of a complete stream. @param {Uint8Array} bytes */
-  _readAll(bytes) {
-    this._append(bytes);
-    const planes = this._advance(false).concat(this._advance(true));
-    if (this._error) throw /** @type {FbaError} */ (this._error);
-    return planes;
-  }
+    // ---- the bytes that came and are still needed; all places are bytes or bits from the start of the stream
+    const input = { _data: whole ?? new Uint8Array(0), _first: 0, _bit: 0 };
+    let end = input._data.length;
+    const byteAt = (/** @type {number} */ byte) => input._data[byte - input._first];
+    const startCodeAt = (/** @type {number} */ byte) => codeAt(input._data, byte - input._first);
+    const bytes = (/** @type {number} */ from, /** @type {number} */ to) => input._data.subarray(from - input._first, to - input._first);
 
-  /** @param {Uint8Array} piece */
-  _append(piece) {
-    const need = this._length + piece.length;
-    if (need > this._data.length) {
-      const old = this._data.subarray(0, this._length);
-      this._data = new Uint8Array(Math.max(need, 2 * this._data.length));
-      this._data.set(old);
+    /** @param {Uint8Array} piece */
+    function append(piece) {
+      const { buffer, byteOffset, length } = input._data;
+      const size = length + piece.length;
+      if (byteOffset + size <= buffer.byteLength) input._data = new Uint8Array(buffer, byteOffset, size);
+      else {
+        const larger = new Uint8Array(2 * size);
+        larger.set(input._data);
+        input._data = larger.subarray(0, size);
+      }
+      input._data.set(piece, length);
+      end += piece.length;
     }
-    this._data.set(piece, this._length);
-    this._length = need;
-  }
 
-  /** End the stream; return the last frames. Throws where the stream ends inside a plane. */
-  finish() {
-    return this._finished && !this._error ? [] : this._frames(true);
-  }
+    /** Drop the bytes that neither the next plane needs, nor a look for start codes behind damage. */
+    function dropBytes() {
+      const needed = Math.floor(Math.min(8 * scanned || bit, codeBit ?? bit, recent[0] ?? bit) / 8);
+      const dropped = needed - input._first;
+      if (dropped >= LONG && 2 * dropped >= input._data.length) {
+        sumUp(needed);
+        input._data = bytes(needed, end);
+        input._first = needed;
+      }
+    }
 
-  /** Return the frames of the bytes so far. @param {boolean} final @returns {import("./frames.js").StreamFrame[]} */
-  _frames(final) {
-    if (this._error) throw this._error;
-    this._finished = final;
-    const frames = this._advance(final).map(streamFrame);
-    if (this._error && (final || !frames.length)) throw /** @type {FbaError} */ (this._error);
-    return frames;
-  }
+    // ---- where reading stands
+    /** The error that ended it. @type {FbaError | undefined} */
+    let failure;
+    let finished = false;
+    let planes = 0;
+    let bit = 0; // next one to decode
+    let scanned = 0; // byte up to which no start code was found, while looking for one; 0 in an object
+    let retryAt = 0; // end of the bytes with which an incomplete plane is tried again
+    let planeBit = 0;
+    /** @type {number | null} */
+    let codeBit = null; // where the start code before the next plane begins
+    /** @type {FbaError | undefined} */
+    let startError;
+    let wasAtEnd = false; // whether the bytes behind an end were being read, behind damage
+    /** Returns a plane, undefined without one, or null where it needs more bytes. @type {(final: boolean) => StreamPlane | null | undefined} */
+    let state = findObject;
 
-  /** Return the planes of the bytes so far; an error is in `_error` then. @param {boolean} final whether no more bytes come */
-  _advance(final) {
-    /** @type {StreamPlane[]} */
-    const planes = [];
-    const { mostFrames, mostBytes } = this._limits;
-    const most = mostBytes + GROWTH * this._length;
-    let memory = 0;
-    while (!this._error) {
-      this._lostFrom = this._bit;
+    /** @param {string} finding @param {number} at bit */
+    const fault = (finding, at, plane = planes, /** @type {import("./errors.js").Kind} */ kind = "damage") =>
+      new FbaError(kind, finding, plane, at);
+    const reader = planeReader(input, (finding, at, kind) => {
+      throw fault(finding, at, planes, kind);
+    });
+    const clock = makeClock(
+      salvage,
+      whole !== undefined,
+      (finding) => warnings.push(`plane ${planes}: ${finding}`),
+      (finding, framesLost) => addDamage(fault(finding, planeBit), planeBit >> 3, undefined, framesLost),
+      resume,
+    );
+
+    /** Return the planes of the bytes so far; an error is in `failure` then. @param {boolean} final whether no more bytes come */
+    function advance(final) {
+      /** @type {StreamPlane[]} */
+      const found = [];
+      let memory = 0;
+      while (!failure) {
+        try {
+          const plane = state(final);
+          if (plane === null) break;
+          if (plane) {
+            found.push(plane);
+            memory += PLANE_BYTES + plane._row.byteLength;
+          }
+          const exceeded =
+            found.length > mostFrames ? "mostFrames"
+            : memory + DAMAGE_BYTES * damage.length > mostBytes + GROWTH * end ? "mostBytes"
+            : "";
+          if (exceeded) throw new FbaError("limit", `more than ${exceeded}`);
+        } catch (error) {
+          if (!(error instanceof FbaError)) throw error;
+          if (salvage && error.kind !== "limit") skipDamage(error);
+          else failure = error;
+        }
+      }
+      if (!failure && !final) dropBytes();
+      return found;
+    }
+
+    /** Return the frames of the bytes so far. @param {boolean} final */
+    function frames(final) {
+      if (failure) throw failure;
+      finished = final;
+      const found = advance(final).map(streamFrame);
+      if (failure && (final || !found.length)) throw /** @type {FbaError} */ (failure);
+      return found;
+    }
+
+    /**
+     * Add bytes; return the frames that they complete. At damage, the frames before it are returned, and the next call
+     * throws the error.
+     * @param {Uint8Array | ArrayBuffer} data
+     */
+    this.push = (data) => {
+      const piece = bytesOf(data);
+      if (finished) throw new FbaError("option", "this decoder is finished");
+      append(piece);
+      return frames(false);
+    };
+
+    /** End the stream; return the last frames. Throws where the stream ends inside a plane. */
+    this.finish = () => (finished && !failure ? [] : frames(true));
+
+    // ---- states
+
+    /** Move on to the next start code; return its last byte, if there is one. */
+    function nextCode() {
+      scanned = input._first + findCode(input._data, Math.max(scanned - input._first, 0));
+      return byteAt(scanned + 3);
+    }
+
+    /** Whether an I plane begins at a byte. @param {number} byte */
+    const beginsIntra = (byte) => byteAt(byte) > 127;
+
+    /** Look for the object start code; headers of other layers may come before it. @param {boolean} final */
+    function findObject(final) {
+      if (!count && !scanned && !startError) {
+        if ([0, 0, 1].some((byte, place) => (input._data[place] ?? byte) !== byte) || (final && end < 4)) {
+          startError = fault(NO_START, 0);
+          if (!salvage) throw startError;
+        }
+      }
+      for (let code; (code = nextCode()) !== undefined; ) {
+        const at = scanned;
+        const joins = isPlane(code) && beginsIntra(at + 4); // an object whose start is missing
+        if (isPlane(code)) {
+          if (count) bit = 8 * objectEnd;
+          const outside = fault("plane outside an object", 8 * at);
+          if (count || !salvage) throw outside;
+          if (at + 4 === end && !final) break; // the first bit of the plane is not here yet
+          startError ??= joins ? fault(NO_START, 0) : outside;
+        }
+        const content = bytes(at + 4, end);
+        const needed = code === USER_DATA ? bytesNeeded(content, objectEnd - objectBegin) : 0;
+        if (needed > content.length && !final) break; // a mark may not be complete
+        takeOutside(code, at, content.subarray(0, needed));
+        scanned = at + 4;
+        compareChecks();
+        if (isObject(code) || joins) {
+          if (startError && !count) addDamage(startError, 0, at);
+          beginObject(at);
+          if (joins) forget();
+          return goOn(joins ? at : at + 4);
+        }
+      }
+      if (!final) bit = Math.max(bit, 8 * scanned);
+      else if (!count) throw fault(NO_START, 0);
+      else if (!inUserData && end > objectEnd) warnings.push(`${end - objectEnd} bytes behind the end`);
+      return null;
+    }
+
+    /** Decode planes from a byte on. @param {number} byte @returns {undefined} */
+    function goOn(byte) {
+      bit = 8 * byte;
+      scanned = 0;
+      state = decodePlanes;
+    }
+
+    /** Decode the next plane, or take the next start code. @param {boolean} final */
+    function decodePlanes(final) {
+      if (end < retryAt && !final) return null;
+      let inPlane = false;
+      input._bit = bit;
       try {
-        const plane = this._state(final);
-        if (plane === null) break;
-        if (plane) {
-          planes.push(plane);
-          memory += PLANE_BYTES + plane.row.byteLength;
-        }
-        const [limit, name] =
-          planes.length > mostFrames ? [mostFrames, "mostFrames"]
-          : memory + DAMAGE_BYTES * this.damage.length > most + GROWTH * this._offset ? [most, "mostBytes"]
-          : [0, ""];
-        if (name) {
-          const remedy = "raise it if the stream is to be trusted";
-          throw new FbaError("limit", `the stream exceeds ${name}, ${limit}`, undefined, undefined, remedy);
-        }
+        const code = takeStartCode(input, codeBit !== null);
+        if (code !== undefined) return takeCode(code);
+        inPlane = true;
+        input._bit = bit;
+        return place(reader._read());
       } catch (error) {
-        if (!(error instanceof FbaError)) throw error;
-        if (this._salvage && error.kind !== "limit") this._skipDamage(error);
-        else this._error = error;
+        if (error !== OUT_OF_DATA) throw error;
       }
-    }
-    if (!this._error && !final) this._dropBytes();
-    return planes;
-  }
-
-  /** Drop the bytes that neither the next plane needs, nor a look for start codes behind damage. */
-  _dropBytes() {
-    const bits = [this._bit, 8 * (this._scanned || Infinity)];
-    for (const bit of [this._codeBit, this._log._recent[0]]) bits.push((bit ?? Infinity) - 8 * this._offset);
-    const needed = Math.floor(Math.min(...bits) / 8);
-    if (needed < SMALLEST || 2 * needed < this._length) return;
-    this._checks._add(this._data, this._offset, this._offset + needed);
-    const rest = this._data.subarray(needed, this._length);
-    this._data = new Uint8Array(Math.max(2 * rest.length, SMALLEST));
-    this._data.set(rest);
-    this._length = rest.length;
-    this._offset += needed;
-    this._bit -= 8 * needed;
-    this._scanned = Math.max(this._scanned - needed, 0);
-    this._retryAt = Math.max(this._retryAt - needed, 0);
-  }
-
-  // ---- states: each returns a plane, undefined without one, or null where it needs more bytes
-
-  /** Look for the object start code; headers of other layers may come before it. @param {boolean} final @returns {StreamPlane | null | undefined} */
-  _findObject(final) {
-    if (this._objects._count === 0 && this._offset + this._scanned === 0 && !this._startError) this._checkStart(final);
-    for (;;) {
-      const at = findCode(this._data, this._scanned, this._length);
-      if (at < 0) {
-        this._scanned = Math.max(this._scanned, this._length - 3);
-        break;
+      if (final && inPlane) {
+        recent = recentSkips = []; // a cut leaves the planes before it alone
+        throw fault("the stream ends in this plane", 8 * end);
       }
-      const code = this._data[at + 3];
-      if (PLANE_CODES.includes(code)) {
-        if (this._objects._count || !this._salvage) throw this._outside(at);
-        if (at + 4 >= this._length && !final) break; // the first bit of the plane is not here yet
-        if (at + 4 < this._length && this._data[at + 4] & 0x80) return this._join(at);
-        this._startError ??= this._outside(at);
+      if (final) {
+        if (planes && salvage) addDamage(fault(NO_END, 8 * end, planes - 1), Math.min(Math.ceil(bit / 8), end), end);
+        bit = 8 * end;
+        objectEnd = end;
+        state = findObject;
+      } else if (inPlane) {
+        const waiting = end - bit / 8;
+        retryAt = end + (waiting > LONG ? waiting / 4 : 0);
       }
-      const content = this._data.subarray(at + 4, this._length);
-      const needed = code === USER_DATA ? bytesNeeded(content, Math.max(this._objects._end - this._objects._begin, 0)) : 0;
-      if (needed > content.length && !final) break; // a mark may not be complete
-      this.warnings.push(...this._objects._takeCode(code, this._offset + at, content.subarray(0, needed)));
-      this._scanned = at + 4;
-      this._compareChecks();
-      if (OBJECT_CODES.includes(code)) {
-        if (this._startError && this._objects._count === 0) this._log._add(this._startError, 0, this._offset + at);
-        this._beginObject(this._offset + at);
-        return this._goOn(at + 4);
+      return null;
+    }
+
+    /** Take a start code in an object. @param {number} code @returns {undefined} */
+    function takeCode(code) {
+      const byte = input._bit / 8 - 4;
+      recent = recentSkips = []; // no plane so far is doubtful: the last ended where a start code begins
+      if (isPlane(code)) codeBit ??= bit;
+      else {
+        codeBit = null;
+        endPeriod(byte);
       }
-    }
-    if (!final) this._bit = Math.max(this._bit, 8 * this._scanned);
-    else if (this._objects._count === 0) {
-      throw new FbaError("damage", NO_START, 0, 0);
-    } else {
-      const rest = this._objects._inUserData ? 0 : this._offset + this._length - this._objects._end;
-      if (rest > 0) this.warnings.push(`${rest} bytes behind the end: not read`);
-    }
-    return null;
-  }
-
-  /** Say that a stream does not begin with a start code: an error, or later a damage. @param {boolean} final */
-  _checkStart(final) {
-    const head = this._data.subarray(0, Math.min(this._length, 4));
-    const begins = [0, 0, 1].every((byte, place) => place >= head.length || head[place] === byte);
-    if (begins && !(final && head.length < 4)) return;
-    const found = [...head].map(hex).join(" ") || "nothing";
-    this._startError = new FbaError("damage", `${NO_START}: the stream begins with ${found}`, 0, 0);
-    if (!this._salvage) throw this._startError;
-  }
-
-  /** Compare the I periods of an object with the checks behind it, if any. */
-  _compareChecks() {
-    const listed = this._objects._checks;
-    this._objects._checks = null;
-    if (!listed) return;
-    const checks = this._checks;
-    const wrong = checks._wrong(listed);
-    for (const [, start, first, stop] of wrong) {
-      const finding = `planes ${first} to ${stop - 1} do not match their CRC-32`;
-      this._reportWrong(finding, [first, stop], start);
-    }
-    const missing = listed.length - checks._periods.length;
-    if (missing > 0 && !(checks._full || checks._leftOut || wrong.length)) {
-      const finding = `${missing} of ${listed.length} I periods are missing`;
-      this._reportWrong(finding, [this._planes, this._planes], this._objects._begin);
-    }
-    this.damage.sort((one, other) => one.start - other.start);
-    this._checks = new PeriodChecks();
-  }
-
-  /** @param {string} finding @param {[number, number]} planes @param {number} byte */
-  _reportWrong(finding, planes, byte) {
-    const error = new FbaError("damage", finding, planes[0], 8 * byte);
-    if (!this._salvage) throw error;
-    this._log._add(error, byte, byte, null, ...planes);
-    if (planes[0] < planes[1]) this._wrong.push(planes);
-  }
-
-  /** Begin at an I plane of an object whose start is missing. @param {number} at byte of its start code @returns {undefined} */
-  _join(at) {
-    this._startError ??= new FbaError("damage", NO_START, 0, 0);
-    this._beginObject(this._offset + at);
-    this._reader._forgetValues();
-    this._checks._abandon();
-    this._log._add(this._startError, 0, this._offset + at);
-    this._goOn(at);
-  }
-
-  /** Decode planes from a byte in the buffer on. @param {number} byte @returns {undefined} */
-  _goOn(byte) {
-    this._bit = 8 * byte;
-    this._scanned = 0;
-    this._state = this._decodePlanes;
-  }
-
-  /** Decode the next planes, or the next start code. @param {boolean} final @returns {StreamPlane | null | undefined} */
-  _decodePlanes(final) {
-    if (this._length < this._retryAt && !final) return null;
-    const bits = new Bits(this._data, this._bit, 8 * this._length);
-    const position = (/** @type {number} */ bit) => bit + 8 * this._offset; // in the stream
-    let inPlane = false;
-    try {
-      const code = bits._takeStartCode(this._codeBit !== null);
-      if (code !== undefined) {
-        this._takeCode(code, bits._bit);
-        return undefined;
+      if (!isPlane(code) && !isObject(code) && !OBJECT_ENDS.includes(code)) {
+        const error = fault(`unknown start code 00 00 01 ${code.toString(16)}`, 8 * byte);
+        if (salvage) throw error;
+        warnings.push(error.message);
       }
-      inPlane = true;
-      return this._place(this._reader._read(bits));
-    } catch (error) {
-      if (error instanceof Fault) throw new FbaError(error._kind, error._finding, this._planes, position(error._bit));
-      if (error !== OUT_OF_DATA) throw error;
+      bit = input._bit;
+      if (isObject(code)) beginObject(byte);
+      else if (!isPlane(code)) endObject(code, byte + 4);
     }
-    if (inPlane && final) {
-      this._log._confirmPlanes(); // a cut leaves the planes before it alone
-      throw new FbaError("damage", "the stream ends inside this plane", this._planes, position(bits._end));
-    }
-    if (final) {
-      if (this._planes && this._salvage) this._reportMissingEnd();
-      this._bit = bits._end;
-      this._objects._end = this._offset + this._length;
-      this._state = this._findObject;
-    } else if (inPlane) { // with a long one, do not try again with every byte
-      const waiting = this._length - (this._bit >> 3);
-      this._retryAt = this._length + (waiting > SMALLEST ? waiting >> 2 : 1);
-    }
-    return null;
-  }
 
-  /** Take a start code in an object. @param {number} code @param {number} bit behind it */
-  _takeCode(code, bit) {
-    const byte = this._offset + bit / 8 - 4;
-    this._log._confirmPlanes();
-    if (PLANE_CODES.includes(code)) this._codeBit ??= this._bit + 8 * this._offset;
-    else {
-      this._codeBit = null;
-      this._checks._end(this._data, this._offset, byte, this._planes);
-    }
-    this._bit = bit;
-    if (OBJECT_CODES.includes(code)) this._beginObject(byte);
-    else if (!PLANE_CODES.includes(code)) this._endObject(code, byte);
-  }
-
-  /** Give a plane its number and its time, and move on past it. @param {import("./planes.js").Plane} plane @returns {StreamPlane} */
-  _place(plane) {
-    const number = this._planes++;
-    const bit = plane.bit + 8 * this._offset;
-    const startCode = this._codeBit !== null;
-    this._bit = plane.stop;
-    plane.stop += 8 * this._offset;
-    if (plane.intra) {
-      for (const problem of this._clock._beginIntra(plane, startCode, number, bit)) {
-        this.warnings.push(`plane ${number}, bit ${bit}: ${problem}`);
+    /** Give a plane its number and its time, and move on past it. @param {import("./planes.js").Plane} plane @returns {StreamPlane} */
+    function place(plane) {
+      const { _shown: shown, _skip: skip } = plane;
+      const startCode = codeBit !== null;
+      planeBit = shown.bit;
+      bit = plane._stop;
+      if (shown.intra) {
+        clock._beginIntra(plane, startCode, resuming, resuming ? estimate() : null);
+        beginPeriod(planeBit - (startCode ? 32 : 0));
       }
-      this._checks._begin(this._data, this._offset, bit - (startCode ? 32 : 0), number);
+      if (salvage) {
+        recent = [...recent, planeBit].slice(-DOUBTFUL);
+        recentSkips = [...recentSkips, skip].slice(-DOUBTFUL);
+        bitsRead += bit - planeBit;
+        framesRead += skip + 1;
+      }
+      shown.bit = codeBit ?? planeBit;
+      codeBit = null;
+      hasBody ||= !!plane._body;
+      const [index, span] = clock._next(skip);
+      Object.assign(shown, { index, plane: planes++, bits: bit - shown.bit });
+      return Object.assign(/** @type {StreamPlane} */ (plane), { _span: span });
     }
-    if (this._salvage) this._log._addPlane(bit, plane.stop, plane.skip);
-    plane.bit = this._codeBit ?? bit;
-    this._codeBit = null;
-    this._objects._hasBody ||= plane.body !== null;
-    return Object.assign(plane, this._clock._next(plane.skip), { number });
-  }
 
-  /** Look, behind damage, for the next start code of an object, or of a plane that is an I plane. @param {boolean} final @returns {undefined | null} */
-  _resynchronise(final) {
-    let at;
-    while ((at = findCode(this._data, this._scanned, this._length)) >= 0) {
-      const code = this._data[at + 3];
-      const wanted = PLANE_CODES.includes(code) || OBJECT_CODES.includes(code);
-      if (wanted && at + 4 >= this._length && !final) return null; // the first bit of the plane is not here yet
-      this._scanned = at + 4;
-      if (!wanted || at + 4 >= this._length) continue;
-      if (PLANE_CODES.includes(code) && !(this._data[at + 4] & 0x80)) continue; // the planes that it depends on are lost
-      this._log._end(this._offset + at);
-      return this._goOn(at);
+    /** Look, behind damage, for the next start code of an object, or of a plane that is an I plane. @param {boolean} final @returns {undefined | null} */
+    function resynchronise(final) {
+      for (let code; (code = nextCode()) !== undefined; ) {
+        const at = scanned;
+        const last = at + 4 === end;
+        if ((isPlane(code) || isObject(code)) && last && !final) return null; // the first bit of the plane is not here yet
+        if (isObject(code) ? !last : isPlane(code) && beginsIntra(at + 4)) {
+          endDamage(at);
+          return goOn(at);
+        }
+        scanned = at + 4;
+      }
+      bit = 8 * scanned;
+      if (!final) return null;
+      // Only user data may follow the end code.
+      let stop = end;
+      while (stop > lastDamage().start && startCodeAt(stop - 4) !== END) stop -= 1;
+      const isEnd = stop >= lastDamage().start + 4 && (stop === end || startCodeAt(stop) === USER_DATA);
+      endDamage(isEnd ? stop : end);
+      resume(isEnd ? estimate() : null);
+      if (!isEnd || !count || wasAtEnd) return null;
+      wasAtEnd = true;
+      endObject(END, stop);
+      return undefined;
     }
-    this._scanned = Math.max(this._scanned, this._length - 3);
-    this._bit = 8 * this._scanned;
-    if (!final) return null;
-    const end = this._findEnd(Math.max(this._log._last.start - this._offset, 0));
-    this._log._end(this._offset + (end ?? this._length));
-    this._log._resume(end === null ? null : this._log._estimate());
-    if (end === null || !this._objects._count || this._wasAtEnd) return null;
-    this._wasAtEnd = true;
-    this._scanned = end;
-    this.warnings.push(...this._objects._endObject(END, this._offset + end));
-    this._state = this._findObject;
-    return undefined;
-  }
 
-  /** Return the byte behind the last end code, if nothing but user data follows it. @param {number} begin */
-  _findEnd(begin) {
-    for (let at = this._length - 4; at >= begin; at -= 1) {
-      if (findCode(this._data, at, at + 4) !== at || this._data[at + 3] !== END) continue;
-      const end = at + 4;
-      const followed = findCode(this._data, end, end + 4) === end && this._data[end + 3] === USER_DATA;
-      return end === this._length || (end + 4 <= this._length && followed) ? end : null;
+    /** List damage in the plane that begins at `bit`, and look for the next place to continue. @param {FbaError} error */
+    function skipDamage(error) {
+      const byte = count ? Math.floor(bit / 8) : 0;
+      scanned = recent.length ? Math.floor(recent[0] / 8) : count ? byte + 1 : Math.floor(bit / 8);
+      if (resuming) lastDamage().framesLost = lastDamage().uncertainty = 0;
+      else lossBegin = byte;
+      addDamage(error, byte, byte, null, planes - recent.length, planes);
+      resuming = true;
+      recent = [];
+      forget();
+      codeBit = null;
+      state = resynchronise;
     }
-    return null;
-  }
 
-  /** @param {number} byte of the stream, at which the object begins */
-  _beginObject(byte) {
-    this._objects._beginObject(byte);
-    this._checks = new PeriodChecks(byte);
-    this._reader._beginObject(this._objects._table);
-    this._clock._beginObject();
-    this._codeBit = null;
-  }
-
-  /** End the object at a start code that is not a plane's. @param {number} code @param {number} byte at which it begins */
-  _endObject(code, byte) {
-    if (code !== END && !LAYER_CODES.includes(code)) {
-      const finding = `start code 00 00 01 ${hex(code)}, expected that of a plane, an object or the end`;
-      const error = new FbaError("damage", finding, this._planes, 8 * byte);
-      if (this._salvage) throw error;
-      this.warnings.push(error.message);
+    /** Forget, behind what is lost, what P planes and checks would need of it. */
+    function forget() {
+      reader._forgetValues();
+      periodBegun = periodFirst = false;
+      periodLeftOut = true;
     }
-    this._scanned = this._bit >> 3;
-    this.warnings.push(...this._objects._endObject(code, this._offset + this._scanned));
-    this._state = this._findObject;
-  }
 
-  /** List damage in the plane at `_lostFrom`, and look for the next place to continue. @param {FbaError} error */
-  _skipDamage(error) {
-    const begun = this._objects._count > 0;
-    const doubtful = this._log._recent[0];
-    this._log._begin(error, begun ? this._offset + (this._lostFrom >> 3) : 0, this._planes);
-    this._reader._forgetValues();
-    this._checks._abandon();
-    this._codeBit = null;
-    if (doubtful !== undefined) this._scanned = Math.floor(doubtful / 8) - this._offset;
-    else this._scanned = begun ? Math.max((this._lostFrom >> 3) + 1, 0) : this._bit >> 3;
-    this._state = this._resynchronise;
-  }
+    // ---- damage
+    let resuming = false; // whether the last damage is over, but no plane behind it was decoded yet
+    /** First bits of the last planes: damage here would make them doubtful. @type {number[]} */
+    let recent = [];
+    /** @type {number[]} */
+    let recentSkips = [];
+    let bitsRead = 0;
+    let framesRead = 0;
+    let lossBegin = 0; // first byte of all damage since the last plane
+    const lastDamage = () => damage[damage.length - 1];
 
-  /** @param {number} at byte of a plane start code outside of an object */
-  _outside(at) {
-    if (this._objects._count) this._lostFrom = 8 * (this._objects._end - this._offset);
-    return new FbaError("damage", "a plane outside of an object", this._planes, 8 * (this._offset + at));
-  }
+    /**
+     * Add damage that planes before and behind it are not lost with.
+     * @param {FbaError} error @param {number} start @param {number} [stop] @param {number | null} [framesLost]
+     * @param {number} [first] doubtful plane @param {number} [behind] the last
+     */
+    function addDamage(error, start, stop = start, framesLost = null, first = 0, behind = 0) {
+      damage.push({ error, start, stop, framesLost, uncertainty: framesLost && 0, doubtful: first < behind ? [first, behind] : null });
+    }
 
-  /** List as damage that the data end without an end code. */
-  _reportMissingEnd() {
-    const length = this._offset + this._length;
-    const error = new FbaError("damage", NO_END, this._planes - 1, 8 * length);
-    this._log._add(error, Math.min(this._offset + Math.ceil(this._bit / 8), length), length);
+    /** Set the end of the last damage. @param {number} byte */
+    function endDamage(byte) {
+      lastDamage().start = Math.min(lastDamage().start, byte);
+      lastDamage().stop = byte;
+    }
+
+    /** A plane was decoded behind the damage, or nothing follows. @param {number[] | null} lost frames, uncertainty */
+    function resume(lost) {
+      [lastDamage().framesLost, lastDamage().uncertainty] = lost ?? [null, null];
+      resuming = false;
+      recentSkips = [];
+    }
+
+    /** Return about how many frames were lost since the last plane, and the uncertainty. */
+    function estimate() {
+      if (!framesRead) return null;
+      const share = (8 * Math.max(lastDamage().stop - lossBegin, 0) * framesRead) / bitsRead;
+      const lost = share % 2 === 0.5 ? share - 0.5 : Math.round(share); // halves go to the even number
+      return [lost, 1 + Math.ceil(lost / 2) + recentSkips.reduce((all, skip) => all + skip, 0)];
+    }
+
+    // ---- objects, the bytes around them, and their marks
+    const marks = whole && !bapSteps ? findMarks(whole) : [];
+    let inUserData = false; // whether user data stand at `objectEnd`
+    let inHeaders = false; // whether headers of a sequence have begun, and no object in it
+    /** @type {import("./parameters.js").BapSteps | null} */
+    let before = null; // the table that user data in those headers name
+    let count = 0;
+    // Of the last object:
+    /** @type {import("./parameters.js").BapSteps} */
+    let table = "iso";
+    let hasBody = false;
+    /** Last byte of the start code that ended it. @type {number | null} */
+    let endCode = null;
+    let objectBegin = 0;
+    let objectEnd = 0; // byte behind that code, or behind user data that follow it
+    /** What the mark behind it lists. @type {string[] | null} */
+    let checks = null;
+
+    /** @param {number} byte at which the object begins */
+    const beginObject = (byte) => {
+      table = bapSteps ?? before ?? marks.find(([, begin, stop]) => begin <= byte && byte < stop)?.[0] ?? "iso";
+      count += 1;
+      hasBody = inHeaders = this.ended = false;
+      objectBegin = byte;
+      this.mark = before;
+      endCode = before = checks = codeBit = null;
+      beginChecks(byte);
+      reader._beginObject(table);
+      clock._beginObject();
+    };
+
+    /** End the object at a start code. @param {number} code @param {number} byte behind it */
+    const endObject = (code, byte) => {
+      endCode = code;
+      this.ended = code === END;
+      objectEnd = scanned = byte;
+      inUserData = false;
+      inHeaders = code === SEQUENCE;
+      state = findObject;
+      compareTables();
+    };
+
+    /**
+     * Take a start code outside of an object, and read the mark if it begins one.
+     * @param {number} code @param {number} byte at which the start code stands @param {Uint8Array} content behind it
+     */
+    const takeOutside = (code, byte, content) => {
+      const directly = byte === objectEnd && count > 0;
+      if (inUserData) objectEnd = byte;
+      inUserData = code === USER_DATA && count > 0 && byte === objectEnd;
+      if (code === SEQUENCE) {
+        inHeaders = true;
+        before = null;
+      }
+      if (code !== USER_DATA || !(directly || inHeaders)) return;
+      const useless = directly && endCode !== END;
+      const found = readMark(content, useless ? [] : warnings);
+      if (!found) return;
+      const named = found[0];
+      if (useless) warnings.push("mark: no end code before it");
+      else if (!directly) {
+        if (before && named && named !== before) warnings.push(otherSteps(named, before));
+        before ??= named;
+      } else {
+        checks = found[1];
+        if (named && named !== this.mark) {
+          this.mark = named;
+          compareTables();
+        }
+      }
+    };
+
+    /** Warn where the object was decoded with another table than that of its mark. */
+    const compareTables = () => {
+      if (this.mark && this.mark !== table && hasBody) warnings.push(otherSteps(this.mark, table));
+    };
+
+    // ---- checks of I periods: an I plane with the planes up to the next one, from its start code, or the byte in which
+    // it begins, to the byte before the next period; the first begins with the object's start code
+    /** Of the periods that have ended: check, first byte, first plane and plane behind the last. @type {[string, number, number, number][]} */
+    let periods = [];
+    let periodLeftOut = false; // whether a period was abandoned
+    let periodBegun = false;
+    let periodFirst = true; // whether the first period begins where the object does
+    let crc = 0;
+    let periodBegin = 0;
+    let summedUp = 0; // first byte that is not in the CRC
+    let periodPlane = 0;
+    /** Planes of periods that do not match their checks. @type {[number, number][]} */
+    const wrong = [];
+
+    /** @param {number} byte at which the object begins */
+    function beginChecks(byte) {
+      periods = [];
+      periodLeftOut = periodBegun = false;
+      periodFirst = true;
+      crc = 0;
+      periodBegin = summedUp = byte;
+    }
+
+    /** Take the bytes up to `stop`. @param {number} stop */
+    function sumUp(stop) {
+      if (stop <= summedUp || !(periodBegun || periodFirst)) return;
+      crc = crc32(bytes(summedUp, stop), crc);
+      summedUp = stop;
+    }
+
+    /** Begin the next period with the next plane. @param {number} at bit */
+    function beginPeriod(at) {
+      endPeriod(Math.ceil(at / 8));
+      if (!periodFirst) {
+        crc = 0;
+        periodBegin = summedUp = Math.floor(at / 8);
+      }
+      periodPlane = planes;
+      periodBegun = true;
+      periodFirst = false;
+    }
+
+    /** End the last period before a byte. @param {number} stop */
+    function endPeriod(stop) {
+      if (periodBegun && periods.length < MOST_PERIODS) {
+        sumUp(stop);
+        periods.push([writtenCheck(crc), periodBegin, periodPlane, planes]);
+      }
+      periodBegun = false;
+    }
+
+    /** Compare the I periods of an object with the checks behind it, if any. */
+    function compareChecks() {
+      const listed = checks;
+      checks = null;
+      if (!listed) return;
+      const report = (/** @type {string} */ finding, /** @type {number} */ byte, /** @type {number} */ first, /** @type {number} */ stop) => {
+        const error = fault(finding, 8 * byte, first);
+        if (!salvage) throw error;
+        addDamage(error, byte, byte, null, first, stop);
+        if (first < stop) wrong.push([first, stop]);
+      };
+      /** @type {Map<string, any>} */
+      const last = new Map(listed.map((check, at) => [check, at]));
+      let following = 0;
+      let bad = 0;
+      for (const [check, begin, first, stop] of periods) {
+        if (last.get(check) >= following) following = listed.indexOf(check, following) + 1;
+        else {
+          report(`planes to ${stop - 1}: wrong check`, begin, first, stop);
+          bad += 1;
+        }
+      }
+      const missing = listed.length - periods.length;
+      if (missing > 0 && !periodLeftOut && !bad && periods.length < MOST_PERIODS) {
+        report(`${missing} I periods missing`, objectBegin, planes, planes);
+      }
+      damage.sort((one, other) => one.start - other.start);
+      beginChecks(0);
+    }
+
+    if (whole) {
+      /** @type {Whole | undefined} */
+      this._whole = [advance(false).concat(advance(true)), wrong, endCode === null];
+      if (failure) throw failure;
+    }
   }
 }

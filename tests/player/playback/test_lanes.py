@@ -1,0 +1,119 @@
+"""What is said, felt and moved over time, and how it is drawn: values set by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fba.animation import Animation
+from fba.tracks import FaceTrack
+from fba_player.playback._lanes import Lane, lane_of_expressions, lane_of_visemes, lane_picture
+from fba_player.playback._time_zoom import MIN_SHOWN_SECONDS, TimeZoom
+from player_tracks import body_track, face_track
+
+RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def spoken() -> Animation:
+    """Six frames at 10 a second from 1 s on: frames 0, 1, 3 and 4 send visemes, frame 2 an expression."""
+    mask = np.zeros((6, 68), dtype=bool)
+    viseme, expression = np.zeros((6, 4), dtype=np.int16), np.zeros((6, 6), dtype=np.int16)
+    mask[[0, 1, 3, 4], 0] = True
+    viseme[0, :3] = 10, 0, 63  # A: alone
+    viseme[1, :3] = 10, 11, 21  # a third of it, two thirds of e
+    viseme[3, :3] = 11, 11, 21  # e in both places
+    mask[2, 1] = True
+    expression[2, :4] = 1, 63, 3, 21  # joy, and a third of anger
+    face = FaceTrack(np.zeros((6, 68), dtype=np.int32), mask, viseme, expression)
+    return Animation(10, np.arange(10, 16), face)  # type: ignore[arg-type]
+
+
+def test_visemes_are_in_force_until_the_next_are_sent() -> None:
+    lane = lane_of_visemes(spoken())
+    assert lane is not None
+    assert lane.at(1.05) == [("A:", 1.0)]
+    for time in (1.1, 1.25):  # frame 2 sends none
+        assert lane.at(time) == [("e", pytest.approx(2 / 3)), ("A:", pytest.approx(1 / 3))]
+    assert lane.at(1.35) == [("e", 1.0)]
+    assert lane.at(1.45) == []  # "none" was sent
+    assert lane.at(0.95) == []
+    assert lane.text(1.1) == "e 67%, A: 33%"
+    assert lane.named(0.0, 9.0, 0.01) == [(1.0, pytest.approx(1.3), "A:"), (1.1, 1.4, "e")]
+    assert lane.named(1.15, 9.0, 0.2) == [(1.15, 1.4, "e")]  # of the other, too little is visible
+
+
+def test_expressions_last_to_the_end_of_the_last_frame() -> None:
+    lane = lane_of_expressions(spoken())
+    assert lane is not None
+    assert lane.at(1.19) == []
+    assert lane.text(1.59) == "joy 63 of 63, anger 21 of 63"
+    assert lane.at(1.61) == []
+
+
+def test_a_stream_that_codes_neither_has_no_lanes() -> None:
+    animation = Animation(25, np.arange(2), face_track([{3: 100}, {3: 200}]))  # type: ignore[arg-type]
+    assert lane_of_visemes(animation) is None
+    assert lane_of_expressions(animation) is None
+    body = Animation(25, np.arange(2), None, body_track([{8: 1}, {8: 2}]))  # type: ignore[arg-type]
+    assert lane_of_visemes(body) is None
+
+
+def lane(rows: list[tuple[float, float, int, float]]) -> Lane:
+    starts, ends, which, shares = (np.array(column) for column in zip(*rows, strict=True))
+    return Lane("visemes", ("none", "a", "b"), starts, ends, which, shares.astype(np.float32))
+
+
+def test_the_height_of_a_name_is_its_intensity() -> None:
+    one = lane([(0.0, 4.0, 1, 1.0), (2.0, 4.0, 2, 0.5)])
+    picture = lane_picture(one, [(0, 0, 0), RED, BLUE], 0.0, 8.0, (80, 10))
+    assert picture.shape == (10, 80, 4)
+    assert (picture[:, :40, 3] > 0).all()
+    assert (picture[:, 40:, 3] == 0).all()
+    assert (picture[:, :20, 0] == 255).all()
+    assert (picture[:5, 20:40, 0] == 255).all()
+    assert (picture[5:, 20:40, 2] == 255).all()  # the weaker stands in front, half as high
+
+
+def test_a_part_is_drawn_as_in_the_whole() -> None:
+    rng = np.random.default_rng(5)
+    starts = np.sort(rng.uniform(0, 60, 3000))
+    rows = [(start, start + 0.3, int(rng.integers(1, 3)), float(rng.random())) for start in starts.tolist()]
+    colours = [(0.0, 0.0, 0.0), RED, BLUE]
+    whole = lane_picture(lane(rows), colours, 0.0, 60.0, (600, 12))
+    part = lane_picture(lane(rows), colours, 20.0, 30.0, (100, 12))
+    np.testing.assert_array_equal(part[:, 1:-1], whole[:, 201:299])
+
+
+def test_many_short_segments_show_their_largest() -> None:
+    rows = [(k / 1000, (k + 1) / 1000, 1, 0.1) for k in range(10_000)]
+    rows[5000] = (5.0, 5.001, 1, 1.0)
+    picture = lane_picture(lane(rows), [(0, 0, 0), RED, BLUE], 0.0, 10.0, (20, 10))
+    full = (picture[..., 3] > 0).sum(axis=0)
+    assert full[10] == 10
+    assert (np.delete(full, 10) <= 2).all()
+
+
+def test_zooming_keeps_the_time_under_the_mouse() -> None:
+    time_zoom = TimeZoom()
+    time_zoom.bound(10.0, 110.0)
+    assert time_zoom.shows_all
+    time_zoom.zoom(0.5, 35.0)
+    assert (time_zoom.low, time_zoom.high) == (22.5, 72.5)  # 35 is a quarter from the left, as before
+    time_zoom.pan(1000.0)
+    assert (time_zoom.low, time_zoom.high) == (60.0, 110.0)
+    time_zoom.follow(20.0)
+    assert (time_zoom.low, time_zoom.high) == (15.0, 65.0)
+    time_zoom.zoom(1e-9, 30.0)
+    assert time_zoom.high - time_zoom.low == pytest.approx(MIN_SHOWN_SECONDS)
+    time_zoom.zoom(1e9, 30.0)
+    assert time_zoom.shows_all
+
+
+def test_the_full_range_stays_full_while_a_stream_arrives() -> None:
+    time_zoom = TimeZoom()
+    time_zoom.bound(0.0, 10.0)
+    time_zoom.bound(0.0, 12.0)
+    assert (time_zoom.low, time_zoom.high) == (0.0, 12.0)
+    time_zoom.zoom(0.25, 0.0)
+    time_zoom.bound(0.0, 20.0)
+    assert (time_zoom.low, time_zoom.high) == (0.0, 3.0)
