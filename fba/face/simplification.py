@@ -56,6 +56,8 @@ LID_SHARE = 4.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
+LASH_SHARE = 0.2
+"""The same for lashes: a hair has little area, yet its lack is seen."""
 SMOOTHING = 0.3
 """Weight of the interpolated motion of a vertex compared to that of each vertex that it stands for."""
 LEAST_AREA = 0.1
@@ -223,9 +225,10 @@ def _importance(model: FaceModel) -> Float64:
             rows = mesh.vertices + model.starts[mesh.part]
             most = max(float(moved.max()), 1e-30) / (LID_SHARE if table.fap in LID_FAPS else 1.0)
             share[rows] = np.maximum(share[rows], moved / most)
-    for part in model.of_kind("eye"):
-        start = model.starts[part.name]
-        share[start : start + len(part.vertices)] = EYE_SHARE
+    for kind, counts in (("eye", EYE_SHARE), ("lash", LASH_SHARE)):
+        for part in model.of_kind(kind):
+            start = model.starts[part.name]
+            share[start : start + len(part.vertices)] = counts
     return 1.0 + IMPORTANCE * share**2
 
 

@@ -51,7 +51,7 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
     lips = (np.abs(x) < 0.034) & (y < -0.025) & (y > -0.098) & (z > 0.07)
     refined = refine(formed, outside & (eyes | lips | (y > 0.03)))
     marks = sculpt.refine_marks(refined, coarse)
-    vertices = sculpt.lay_on_eyeballs(refined.vertices, marks.eye) - ORIGIN
+    vertices = sculpt.press_lips(sculpt.lay_on_eyeballs(refined.vertices, marks.eye), marks) - ORIGIN
     normals = vertex_normals(vertices, refined.triangles)
     vertices = vertices + normals * (paint.THICKNESS * paint.scalp(vertices, 0.012))[:, None]
     return replace(refined, vertices=symmetrise(vertices)), marks
@@ -159,7 +159,6 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     ring, eye = marks.mouth, marks.eye
     near = ring != sculpt.FAR
     colours = np.ones((len(surface.vertices), 4))
-    depth = np.where(near & (ring < 0), -ring, 0.0)
     wet = np.where(near, 1 - smoothstep((ring - 0.5) / 2.0), 0.0)
     lips = np.where(near, 1 - smoothstep((ring - 3.5) / 2.0), 0.0)
     lids = np.where((eye != sculpt.FAR) & (eye <= 2.6), 1.0, 0.0)
@@ -170,8 +169,8 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     gloss = 0.38 + 0.06 * oily + 0.10 * lips + 0.14 * wet + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped) + 0.16 * cropped
-    colours[:, :3] *= (1.0 / (1 + 0.35 * depth))[:, None]
-    colours[(ring < -8) & near, :3] *= 0.5
+    throat = smoothstep((-0.012 - z) / 0.055) * (near & (ring < 0))
+    colours[:, :3] *= 1 - throat[:, None] * (0.62, 0.75, 0.75)
     colours[:, :3] *= _nostrils(surface)[:, None]
     return colours
 

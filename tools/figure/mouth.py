@@ -10,9 +10,9 @@ from meshes import Mesh, join, mirror, tube
 
 from fba.arrays import Float64
 
-ENAMEL = np.array([0.80, 0.735, 0.60])
+ENAMEL = np.array([0.86, 0.79, 0.66])
 """Linear light."""
-NECK = np.array([0.70, 0.57, 0.40])
+NECK = np.array([0.76, 0.63, 0.46])
 GUM = np.array([0.52, 0.165, 0.145])
 TONGUE = np.array([0.50, 0.170, 0.155])
 TONGUE_UNDER = np.array([0.34, 0.09, 0.09])
@@ -95,12 +95,12 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = np.stack([np.full(AROUND, last), ring, np.roll(ring, -1)], axis=1)
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
-    behind = 1 - 0.045 * (place - 1) ** 1.35  # teeth further back lie in the shade of the cheeks
+    behind = 1 - 0.03 * (place - 1) ** 1.35  # teeth further back lie in the shade of the cheeks
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * max(behind, 0.3)
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1]])
     # Between the teeth it is darker.
     side = np.concatenate([np.tile(np.abs(cx) ** 8, len(rows)), [0.0]])
-    colours = colours * (1 - 0.45 * side)[:, None]
+    colours = colours * (1 - side[:, None] * (0.30, 0.36, 0.40))
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 
@@ -159,13 +159,13 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     """Return the mesh of a tongue lying flat, and vertices of its feature points. tip: (3,), at the teeth."""
     # Down the tongue from its root to its tip, mm: z, top, half width, height.
     spine = np.array([
-        (-68, -12, 17, 17), (-58, -4, 20, 21), (-48, 0.5, 22, 21), (-38, 2.0, 22.5, 19), (-28, 2.2, 21.5, 16),
-        (-19, 1.9, 19, 12.5), (-11, 1.4, 15.5, 9.0), (-5, 0.9, 11.5, 6.2), (-2, 0.5, 8.2, 4.4),
-        (-0.5, 0.25, 4.6, 2.8),
+        (-65, -34, 15, 24), (-61.5, -14, 17, 26), (-56, -4.5, 17.5, 24), (-48, 0.5, 17.5, 22),
+        (-38, 2.0, 17.5, 19.5), (-28, 2.2, 17, 16), (-19, 1.9, 15.4, 12.5), (-11, 1.4, 12.6, 8.6),
+        (-5, 0.9, 9.2, 5.4), (-2, 0.5, 6.6, 3.6), (-0.5, 0.25, 4.0, 2.2),
     ])  # fmt: skip
     from scipy.interpolate import PchipInterpolator
 
-    rings, around = 21, 24
+    rings, around = 27, 24
     t = np.linspace(0, 1, rings)
     knots = np.linspace(0, 1, len(spine))
     z, top, half, tall = PchipInterpolator(knots, spine / 1000)(t).T
@@ -191,13 +191,13 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     ]
     under = np.clip(0.5 - cy, 0, 1)[None, :, None]
     colours = TONGUE * (1 - under) + TONGUE_UNDER * under
-    colours = colours * (0.30 + 0.70 * t[:, None, None] ** 0.8)
+    colours = colours * (0.40 + 0.60 * t[:, None, None])
     random = np.random.default_rng(5)
     colours = colours * (1 + 0.12 * (random.random((rings, around, 1)) - 0.5))
     flat_colours = np.concatenate([colours.reshape(-1, 3), [TONGUE * 0.2], [TONGUE]])
-    body = int(np.abs(t - 0.52).argmin())
+    body = int(np.abs(t - 0.568).argmin())
     upward = around // 4
-    side = int(np.abs(t - 0.60).argmin()) * around
+    side = int(np.abs(t - 0.64).argmin()) * around
     points = {"6.1": point, "6.2": body * around + upward, "6.3": side, "6.4": side + around // 2}
-    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.7)])
+    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.5)])
     return mesh, points

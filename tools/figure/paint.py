@@ -194,7 +194,7 @@ def _eyes(colour: Float64, p: Float64, ring: Float64) -> Float64:
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.78, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.26, line)
-    line *= smoothstep((x - 19.0) / 5.0)
+    line *= smoothstep((x - 19.0) / 5.0) * (1 - 0.85 * smoothstep((x - 37.5) / 4.0))
     colour = _blend(colour, HAIR, line)
     caruncle = near & (ring < 1.6) & (x < 24)
     return np.where(caruncle[:, None], CARUNCLE + noise(p, 0.001, 9)[:, None] * 10, colour)

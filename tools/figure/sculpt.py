@@ -32,6 +32,9 @@ MOUTH = np.array([0.0, -0.0708])
 CONTACT_RING = 1
 """Ring along which the lips touch, counted from the border of the inside of the mouth."""
 
+LIP_OVERLAP = 0.0009
+"""Metres by which the upper lip reaches below that ring, behind it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Marks:
@@ -224,6 +227,18 @@ def _mouth(vertices: Float64, marks: Marks) -> Float64:
         on_side = label == side
         vertices[on_side, 1] += ((MOUTH[1] - y[side]) * fade)[on_side]
         vertices[on_side, 2] += (((z[1] + z[-1]) / 2 - z[side]) * fade)[on_side]
+    return vertices
+
+
+def press_lips(vertices: Float64, marks: Marks) -> Float64:
+    """Return vertices of the refined head whose upper lip reaches down behind the lower one.
+
+    So no picture, however small or coarse, shows a gap between closed lips.
+    """
+    behind = (marks.mouth > 0) & (marks.mouth < CONTACT_RING) & (marks.lip == 1)
+    depth = LIP_OVERLAP * (1 - smoothstep((np.abs(vertices[:, 0]) - 0.017) / 0.007))
+    vertices = vertices.copy()
+    vertices[behind, 1] = np.minimum(vertices[behind, 1], MOUTH[1] - depth[behind])
     return vertices
 
 

@@ -20,6 +20,8 @@ SMOOTH = 1.6
 """Rows over which the outline is smoothed."""
 LEAST_SHARE, MOST_SHARE = 0.08, 0.9
 """Share of the picture that a head covers."""
+RIPPLE = 0.5
+"""Pixels by which an outline goes back, at least, between two of its extrema."""
 SLOPES = (0.0, 0.15, 0.3, 0.45)
 """Slants of the outline, tried one after another, at which its extrema are looked for."""
 LIP_SHARE = (0.32, 0.72)
@@ -147,6 +149,8 @@ def _extrema(signal: Float64, nose: int) -> dict[str, float]:
     turning = np.sign(np.diff(signal))
     maxima = [y for y in known[2:-2] if turning[y - 1] > 0 >= turning[y]]
     minima = [y for y in known[2:-2] if turning[y - 1] < 0 <= turning[y]]
+    ripples = _ripples(signal, sorted([*maxima, *minima]))
+    maxima, minima = ([y for y in rows if y not in ripples] for rows in (maxima, minima))
 
     def after(rows: list[int], start: float) -> float | None:
         return next((float(y) for y in rows if y > start + 1), None)
@@ -167,6 +171,18 @@ def _extrema(signal: Float64, nose: int) -> dict[str, float]:
         if name is not None:
             found[name] = at
     return found
+
+
+def _ripples(signal: Float64, rows: list[int]) -> set[int]:
+    """Return those of the rows of extrema between which the outline hardly goes back: edges of pixels."""
+    kept = list(rows)
+    while len(kept) > 1:
+        depths = np.abs(np.diff(signal[kept]))
+        least = int(depths.argmin())
+        if depths[least] >= RIPPLE:
+            break
+        del kept[least : least + 2]
+    return set(rows) - set(kept)
 
 
 def _is_face(found: dict[str, float], signal: Float64) -> bool:

@@ -29,11 +29,13 @@ class DetailLevels:
 
     points: (V, N), each vertex's positions in all poses that count (3 x poses columns), then any attributes
     to be preserved, scaled so that a difference of 1 weighs as much as a metre. triangles: int32 (F, 3).
+    kept: bool (V,), vertices that stay at every level, as along lips that would gape; or None.
     """
 
     points: Float32
     poses: int
     triangles: Int32
+    kept: Bool | None = None
 
     def triangles_within(self, tolerance: float) -> Int32 | None:
         """Return int32 (F, 3): the coarsest triangles with at most this error (m); None for all."""
@@ -42,7 +44,7 @@ class DetailLevels:
             return None
         onto, first = self._collapses
         target = np.arange(len(onto), dtype=np.int32)
-        collapses = first <= level
+        collapses = first <= level if self.kept is None else (first <= level) & ~self.kept
         for _ in range(MAX_PASSES * len(TOLERANCES)):  # no more steps than passes were made
             if not collapses[target].any():
                 break

@@ -22,6 +22,8 @@ from fba_player._figure._face_parts import (
     middle_of_points,
     part_rows,
 )
+from fba_player._figure._lids import follow_gaze
+from fba_player._figure._tongue import Tongue, find_tongues
 from fba_player._figure.face_light import FaceLight
 from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
@@ -114,7 +116,10 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The face for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4)."""
+    """The face shown for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4).
+
+    Lids follow the gaze, and the tongue keeps between teeth and lips.
+    """
 
     faps: Float32
     positions: Float32
@@ -137,6 +142,7 @@ class FaceFigure:
     shapes: dict[str, FaceShape]
     eyeballs: list[tuple[Part, Eyeball]]
     light: FaceLight
+    tongues: list[Tongue]
     _pose: Pose | None = field(default=None, init=False)
 
     @property
@@ -172,7 +178,11 @@ class FaceFigure:
 
     def _posed(self, faps: Float32) -> Pose:
         normals = np.empty((len(self.model.vertices), 3), dtype=np.float32)
-        positions = self.deformer.local(faps, out=np.empty_like(normals), normals=normals)
+        eyes = [(ball.side, ball.radius) for _, ball in self.eyeballs]
+        shown = follow_gaze(faps, eyes, self.model.fapu.IRISD)
+        positions = self.deformer.local(shown, out=np.empty_like(normals), normals=normals)
+        for tongue in self.tongues:
+            tongue.bend(positions, normals, faps)
         return Pose(faps, positions, normals, self.deformer.head_matrices(faps))
 
     def meshes(
@@ -248,7 +258,8 @@ def build_figure(model: FaceModel) -> FaceFigure:
             shape = replace(shape, levels=coarse_shapes(model, part, shape), rest=part.vertices)
         shapes[part.name] = shape
     light = FaceLight(model, deformer, sway)
-    return FaceFigure(model, deformer, sway, _head_centre(model), shapes, eyeballs, light)
+    tongues = find_tongues(model)
+    return FaceFigure(model, deformer, sway, _head_centre(model), shapes, eyeballs, light, tongues)
 
 
 def _head_centre(model: FaceModel) -> Float64:

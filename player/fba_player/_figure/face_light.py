@@ -15,6 +15,7 @@ from fba.cache import load_or_make, make_key
 from fba.compiled import compiled, is_compiled
 from fba.face import Deformer, FaceModel
 from fba.parameters import point_rows
+from fba_player._figure._closing_lines import closing_vertices
 from fba_player._figure._face_parts import part_rows
 from fba_player._figure.occlusion import CACHE_VERSION, HARMONICS, Visibility, bake, weights
 
@@ -27,8 +28,20 @@ MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
 """FAPs of a mouth so wide open that light falls in."""
 FREE_LIGHT = (0.9, 0.8, 0.0, 0.3)
 """Light on a tongue that is put out: key, sky, through, rim."""
-TEETH_FILL_SHARE = 0.3
+TEETH_FILL_SHARE = 0.45
 """Share of the missing light that is added on teeth when the mouth is open."""
+UPPER_LIDS, CLOSED = (19, 20), 1024
+"""FAPs of the upper lids, and the value that closes them."""
+LIDS_REACH = 0.35
+"""Distance from the pupils, in ES0, within which light depends on the lids."""
+CLOSING_SKY = 0.45
+"""Least share of the sky's light along lips and lids, where they touch."""
+ENCLOSED = 0.04
+"""Vertices near the mouth that see less of the sky than this while it is shut may be inside."""
+INSIDE_KEY, INSIDE_SKY = 0.20, 0.36
+"""Shares of key light and sky that reach the inside of an open mouth by reflection."""
+CONSTANT_HARMONIC = 0.282095
+"""The first spherical harmonic, equal in all directions."""
 TURN_DECIMALS = 2
 """Decimals to which the head's rotation is rounded; the light changes invisibly little."""
 MIN_SWAY = 0.05
@@ -129,19 +142,49 @@ class FaceLight:
         triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
         faps = np.zeros(68, dtype=np.float32)
         still, normals = self._posed(faps)
-        shut = cached_visibility(still, normals, triangles, self._sway > MIN_SWAY)
+        bare = cached_visibility(still, normals, triangles, self._sway > MIN_SWAY)
+        shut = self._lit_lines(self._lit_lids(bare, triangles))
         if self._lips is None:
             return Baked(shut, shut, np.zeros(len(still), dtype=bool), (0.0, 0.0))
         for fap, value in MOUTH_OPEN.items():
             faps[fap - 1] = value
         moved, normals = self._posed(faps)
         near = self._near_mouth(still)
-        wide = cached_visibility(moved, normals, triangles, near)
+        inside = _largest_piece(self._model.triangles, bare.open < ENCLOSED, near)
+        for rows in self._tongues:
+            inside[rows] = True
+        near |= inside
+        wide = _lit_inside(cached_visibility(moved, normals, triangles, near), inside)
         arrays = [
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
             for before, after in zip(shut, wide, strict=True)
         ]
         return Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
+
+    def _lit_lids(self, shut: Visibility, triangles: Int32) -> Visibility:
+        """Return visibility with that of closed eyes where more light falls on the lids then: folds open."""
+        eyes = self._model.points[[point_rows()["3.5"], point_rows()["3.6"]]]
+        if not np.isfinite(eyes).all():
+            return shut
+        faps = np.zeros(68, dtype=np.float32)
+        still = self._posed(faps)[0]
+        faps[[lid - 1 for lid in UPPER_LIDS]] = CLOSED
+        away = np.linalg.norm(still[:, None] - eyes, axis=2).min(axis=1)
+        near = away < LIDS_REACH * self._model.fapu.ES * 1024
+        closed = cached_visibility(*self._posed(faps), triangles, near)
+        more = near & (closed.open > shut.open)
+        arrays = (
+            np.where(more[:, None] if old.ndim == 2 else more, new, old)
+            for old, new in zip(shut, closed, strict=True)
+        )
+        return Visibility(*arrays)
+
+    def _lit_lines(self, shut: Visibility) -> Visibility:
+        """Return visibility with some light where lips and lids touch: they are flesh, not holes."""
+        found = [closing_vertices(self._model, part) for part in self._model.parts]
+        parts = zip(self._model.parts, found, strict=True)
+        closing = np.concatenate([np.zeros(len(p.vertices), bool) if c is None else c for p, c in parts])
+        return shut._replace(open=np.where(closing, np.maximum(shut.open, CLOSING_SKY), shut.open))
 
     def _posed(self, faps: Float32) -> tuple[Float32, Float32]:
         positions = np.empty((len(self._sway), 3), dtype=np.float32)
@@ -152,6 +195,27 @@ class FaceLight:
         """Return bool (V,): vertices about as near to the mouth as the eyes are to the nose."""
         away = np.linalg.norm(positions - positions[self._lips].mean(axis=0), axis=1)
         return np.asarray(away < 1.1 * self._model.fapu.ENS * 1024)
+
+
+def _largest_piece(triangles: Int32, chosen: Bool, near: Bool) -> Bool:
+    """Return bool (V,): the connected piece of chosen vertices that has most of those that are near."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+    edges = edges[chosen[edges].all(axis=1)]
+    ones = np.ones(len(edges), dtype=bool)
+    _, piece = connected_components(csr_array((ones, edges.T), shape=(len(chosen),) * 2), directed=False)
+    most = np.bincount(piece[chosen & near], minlength=1)
+    return chosen & (piece == most.argmax()) if most.any() else np.zeros_like(chosen)
+
+
+def _lit_inside(wide: Visibility, enclosed: Bool) -> Visibility:
+    """Return visibility with the light that walls of the mouth cast on each other. enclosed: bool (V,)."""
+    light, open_ = wide.light.copy(), wide.open.copy()
+    light[enclosed, 0] += INSIDE_KEY / CONSTANT_HARMONIC
+    open_[enclosed] += INSIDE_SKY * (1 - open_[enclosed])
+    return wide._replace(light=light, open=open_)
 
 
 def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:

@@ -20,6 +20,7 @@ from fba.body import BodyPart
 from fba.face import FaceDefMesh, FaceModel, InterpolationTable, Part, Term
 from fba.face.deform.flat_tables import KIND_ORDER, flatten_transforms
 from fba.parameters import EXPRESSION_FIELDS, VISEME_FIELDS, faps
+from fba_player._figure._tongue import Tongue
 from fba_player._figure.face import FaceFigure
 from fba_player._mesh.textures import load_picture
 from fba_player.view._view import FaceShape
@@ -40,6 +41,8 @@ TEXTURE_QUALITY = 80
 COORDINATE_STEP = 1 / 8192
 SWAY_STEP = 1 / 8192
 HAIR_STEP = 1 / 127
+LENGTH_STEP = 1 / 1024
+"""Of a tongue's cross sections."""
 WIDTH_STEP = 1e-6
 """Metres: widths of hairs are multiples of it."""
 
@@ -202,12 +205,39 @@ def pack_face_parts(
             for part, ball in figure.eyeballs
             if part.name in places
         ],
+        "tongues": [
+            {"part": places[tongue.part], **packed}
+            for tongue in figure.tongues
+            if tongue.part in places and (packed := _pack_tongue(container, tongue, reduced.rows, number))
+        ],
         "light": pack_face_light(container, figure, reduced.rows),
         "wrinkles": pack_wrinkles(container, figure, reduced.rows),
         **pack_rules(model),
         **_pack_motion(container, figure, reduced.rows),
     }
     return header, reduced.rows
+
+
+def _pack_tongue(
+    container: Container, tongue: Tongue, rows: Int64, number: dict[int, int]
+) -> dict[str, Any] | None:
+    """Return what keeps a tongue in its place; None if vertices around it do not stay.
+
+    rows: (W,), the model's vertices that stay, in their new order. number: the places of these vertices.
+    """
+    around = [*tongue.lips.tolist(), *tongue.teeth.tolist(), tongue.front]
+    if not all(row in number for row in around):
+        return None
+    places = [number[row] for row in around]
+    inside = rows[(rows >= tongue.rows.start) & (rows < tongue.rows.stop)] - tongue.rows.start
+    return {
+        "slices": container.add_integers(tongue.slice_of[inside]),
+        "length": container.add_fractions(tongue.length[inside, None], LENGTH_STEP),
+        "lips": places[:4],
+        "teeth": places[4:8],
+        "front": places[8],
+        "size": tongue.size,
+    }
 
 
 def pack_rules(model: FaceModel) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from fba_player import Timeline
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._figure.model_units import prepare_model, resize
 from fba_player._figure.person import Person, build_person
-from fba_player.view._geometry import rotation_vector
+from fba_player.view._geometry import rotation_vector, transform
 from fba_player.web._packing import Packed, pack_figure
 from gltf_edits import edit
 from small_people import write_person
@@ -395,10 +395,8 @@ def compare(
 def _compare_head(figure: FaceFigure, packed: Packed, faps: Any, row: Float64, errors: Errors) -> None:
     count = len(packed.face_rows)
     rigid, placed, normals = row[: 9 * count].reshape(3, -1, 3)
-    expected = np.empty_like(figure.model.vertices)
-    figure.deformer(faps, normals=expected)
-    errors.add("vertices", _distances(rigid, figure.deformer(faps)[packed.face_rows]))
     pose = figure.pose(faps)
+    errors.add("vertices", _distances(rigid, transform(pose.positions, pose.turn)[packed.face_rows]))
     light = figure.light.shade(pose.positions, pose.turn[:3, :3], np.eye(3))[packed.face_rows]
     errors.add("light", np.abs(row[9 * count :].reshape(-1, 4) - light))
     axis = rotation_vector(pose.turn[:3, :3])

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fba.arrays import Float64, Intp
+from fba.arrays import Bool, Float64, Intp
 from fba.face.authoring.regions._eye_opening import (
     CLOSED,
     LIDS,
@@ -78,6 +78,8 @@ LEAST_TURN = 0.3
 MAX_SUNK = 0.03
 """Shortfall of a margin from the clearance of moved lids, in radii of the eyeball, above which both margins
 meet where they are, as a gap would be seen otherwise."""
+MAX_HAIR_WIDTH = 0.04
+"""Width of a single lash's root, at most, as a share of the eye's width."""
 CORNER_WIDTH = 0.12
 """Distance from the corners, as a share of the eye's width, within which folds do not stop a lid."""
 
@@ -272,10 +274,34 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) 
     root = hair_roots(shape, reach[0 if lid == "upper" else 1])
     moving = np.flatnonzero(grows[pieces][shape.number])
     points = part.vertices[moving].astype(np.float64)
-    columns = shape.vertices[root[shape.number[moving]], 0]
+    of_root = root[shape.number[moving]]
+    hair = _single_hairs(shape.vertices[root, 0], pieces, MAX_HAIR_WIDTH * wide)
+    columns = _shared(shape.vertices[root, :1], pieces, hair)[shape.number[moving], 0]
     ways = np.clip(skin.values, *_moving_range(skin)) / CLOSED
     turns = slide_lid(points, np.ones(len(points)), opening, eye, lid, ways, columns=columns)
+    # roots stay in the skin, which a fold or the other lid may have stopped
+    _, nearest = cKDTree(marks.surface.vertices[skin.vertices]).query(shape.vertices[root])
+    at_root = slide_lid(
+        shape.vertices[of_root], np.ones(len(points)), opening, eye, lid, ways, columns=columns
+    )
+    for k, at in enumerate(at_root):
+        turns[k] += _shared(skin.shifts[k, nearest], pieces, hair)[shape.number[moving]] - at
     return Motion(skin.values, moving, turns)
+
+
+def _single_hairs(columns: Float64, pieces: Intp, width: float) -> Bool:
+    """Return (N,) mask of vertices of pieces whose roots, at columns (N,), are not wider than this."""
+    low, high = np.full(pieces.max() + 1, np.inf), np.full(pieces.max() + 1, -np.inf)
+    np.minimum.at(low, pieces, columns)
+    np.maximum.at(high, pieces, columns)
+    return np.asarray((high - low <= width)[pieces])
+
+
+def _shared(values: Float64, pieces: Intp, single: Bool) -> Float64:
+    """Return values (N, K), of single hairs the mean of each: they do not bend."""
+    count = np.bincount(pieces)
+    mean = np.stack([np.bincount(pieces, column) / count for column in values.T], axis=1)
+    return np.where(single[:, None], mean[pieces], values)
 
 
 def _moving_range(skin: Motion) -> tuple[float, float]:

@@ -220,10 +220,10 @@ def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) 
         number = np.array([k for _, k in known])
     else:
         number = PchipInterpolator(*zip(*known, strict=True))(length)
-    return _cardinal(np.clip(number, 0, len(nodes) - 1), len(nodes))
+    return smooth_weights(np.clip(number, 0, len(nodes) - 1), len(nodes))
 
 
-def _cardinal(x: Float64, count: int) -> Float64:
+def smooth_weights(x: Float64, count: int) -> Float64:
     """Return (M, count) weights of values at 0, 1, ... in the smooth curve through them, at x."""
     k = np.clip(np.floor(x).astype(np.intp), 0, count - 2)
     t = x - k

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
+from fba.face.authoring.regions._lips import smooth_weights
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion
 from fba.face.authoring.surface._motion_limits import eased_linear_motion
@@ -60,8 +61,9 @@ class Region:
 
     points: that pull. still, contours: points and contours that stay. reach: of the motion, in ES0. share: of
     the distance to fixed vertices that moves. slack: distance in ES0 beyond which the skin does not
-    overshoot. through: depth in ES0 to which surfaces behind the skin move with it, or 0. behind: these
-    surfaces, the inside of the "mouth" or "all".
+    overshoot. band: distance in ES0 from the line through the points of each side, within which skin moves as
+    that line does, or 0. through: depth in ES0 to which surfaces behind the skin move with it, or 0. behind:
+    these surfaces, the inside of the "mouth" or "all".
     """
 
     name: str
@@ -71,6 +73,7 @@ class Region:
     reach: float
     share: float
     slack: float
+    band: float
     through: float
     behind: str
 
@@ -97,6 +100,7 @@ def regions() -> dict[str, Region]:
             float(row["reach"]),
             float(row["share"]),
             float(row["slack"]),
+            float(row["band"]),
             float(row["through"]),
             row["behind"],
         )
@@ -147,7 +151,9 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
     given = np.array([[handle.values.get(points[k], 0.0) for handle in own] for k in first])
     fixed = np.concatenate([pulled, stays])
     values = np.concatenate([given, np.zeros((len(stays), len(own)))])
-    solved = solve_smooth_field(surface, free, fixed, values, slack=area.slack * es)
+    band, along = _band(marks, area, own, np.flatnonzero(free & ~surface.mask(fixed)))
+    held, at_held = np.concatenate([fixed, band]), np.concatenate([values, along])
+    solved = solve_smooth_field(surface, free, held, at_held, slack=area.slack * es)
     if area.through:
         behind = surface.distances(pulled, 1.6 * reach) < np.inf
         behind &= marks.inside_mouth if area.behind == "mouth" else ~marks.lips & ~marks.on_inner_lips
@@ -159,6 +165,27 @@ def _fields(marks: Landmarks, area: Region, own: list[Handle]) -> tuple[Float64,
                 lifted[targets] = average_with_neighbours(surface, lifted, 1)[targets]
             solved[:, k] = lifted
     return trim_small(solved), surface.mask(fixed)
+
+
+def _band(marks: Landmarks, area: Region, own: list[Handle], free: Intp) -> tuple[Intp, Float64]:
+    """Return those of the free vertices that are near the line of points of their side, and shares (M, H).
+
+    Across the line the skin moves alike: a brow keeps its width.
+    """
+    chosen, shares = [np.zeros(0, dtype=np.intp)], [np.zeros((0, len(own)))]
+    for line in (area.points[::2], area.points[1::2]):
+        if not area.band or not marks.has(*line):
+            continue
+        nodes = marks.surface.vertices[marks.vertices_of(line)]
+        order = np.argsort(nodes[:, 0])
+        places = marks.surface.vertices[free]
+        number = np.interp(places[:, 0], nodes[order, 0], np.arange(len(line)))
+        weights = smooth_weights(number, len(line))
+        near = np.linalg.norm(places - weights @ nodes[order], axis=1) < area.band * marks.fapu.ES * 1024
+        given = np.array([[handle.values.get(line[k], 0.0) for handle in own] for k in order])
+        chosen.append(free[near])
+        shares.append(weights[near] @ given)
+    return np.concatenate(chosen), np.concatenate(shares)
 
 
 def _motion(marks: Landmarks, limiter: Limiter, handle: Handle, field: Float64, pinned: Bool) -> Motion:

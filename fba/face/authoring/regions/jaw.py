@@ -50,6 +50,7 @@ class Tuning:
     cheek_margin: float = 0.4
     one_jaw_margin: float = 0.15  # teeth with half plus this share on one side of their edge are one jaw's
     lip_depth: float = 0.16  # distance from the lips beyond which the mouth moves as the jaws do, in ES0
+    root: float = 0.15  # share of the tongue's length that stays in the throat
     tip_bend: float = 2.0  # power of the length with which the motion falls off to the root: it bends
     roll_steps: int = 8  # number of values at which the roll is computed
 
@@ -262,6 +263,7 @@ def tongue_motion(marks: Landmarks, part: Part, fap: int) -> Motion | str:
     root = float(points[:, 2].min())
     if tip[2] - root <= 0:
         return "the tongue's tip (6.1) is not before its root"
+    root += TUNING.root * float(tip[2] - root)
     length = np.clip((points[:, 2] - root) / (tip[2] - root), 0.0, 1.0)
     if fap == 46:
         middle = (marks.point("6.2")[2] - root) / (tip[2] - root)
@@ -288,6 +290,7 @@ def _tongue_roll(marks: Landmarks, points: Float64) -> Motion:
     half = (left[0] - right[0]) / 2
     x, y = points[:, 0] - middle[0], points[:, 1] - middle[1]
     root, tip = float(points[:, 2].min()), float(points[:, 2].max())
+    root += TUNING.root * (tip - root)
     along = (
         smoothstep((points[:, 2] - root) / max(left[2] - root, 1e-9)) if tip > root else np.ones(len(points))
     )

@@ -309,9 +309,10 @@ def _mouth(
         raise ModelError(f"{path}: the shape jawOpen does not part any lips at the midline of the face")
     upper, lower = pair
     points = {"2.2": vertices[upper], "2.3": vertices[lower]}
+    line = float(points["2.2"][1] + points["2.3"][1]) / 2  # one lip may reach behind the other
     on_edge = mouth_points(skin, drop, points["2.2"], points["2.3"], float(apart))
     for side, sign, inner, outer in (("Left", 1, "2.4", "8.3"), ("Right", -1, "2.5", "8.4")):
-        level = np.abs(vertices[:, 1] - vertices[upper, 1]) < 0.25 * apart
+        level = np.abs(vertices[:, 1] - line) < 0.25 * apart
         beside = (vertices[:, 0] - middle[0]) * sign > 0.15 * apart
         front = vertices[:, 2] > middle[2] - 0.6 * apart
         candidates = level & beside & front & facing
@@ -326,7 +327,7 @@ def _mouth(
         else:
             size = np.linalg.norm(shapes[shape], axis=1)
             # what moves furthest is the corner of the mouth, or the cheek behind it; only the outside counts
-            off = np.abs(vertices[:, 1] - vertices[upper, 1]) / apart
+            off = np.abs(vertices[:, 1] - line) / apart
             most = max(float(size[candidates].max()), 1e-12)
             corner = vertices[int(np.where(candidates, size / most - 2 * off, -np.inf).argmax())]
             within = (corner[0] - vertices[:, 0]) * sign > 0.015 * apart
@@ -337,8 +338,8 @@ def _mouth(
         beyond = points[inner] + (TUNING.corner_width * apart * sign, 0.0, 0.25 * TUNING.corner_width * apart)
         away = np.linalg.norm(vertices - beyond, axis=1)
         points[outer] = vertices[int(np.where(candidates, away, np.inf).argmin())]
-        line = ahead & (np.abs(vertices[:, 1] - vertices[upper, 1]) < 0.1 * apart)
-        half = _lip_pair(vertices, drop, line, float(middle[0] + points[inner][0]) / 2, apart)
+        lips = ahead & (np.abs(vertices[:, 1] - line) < 0.1 * apart)
+        half = _lip_pair(vertices, drop, lips, float(middle[0] + points[inner][0]) / 2, apart)
         if half is not None and np.linalg.norm(vertices[half[0]] - vertices[half[1]]) < 0.08 * apart:
             points[{"2.4": "2.6", "2.5": "2.7"}[inner]] = vertices[half[0]]
             points[{"2.4": "2.8", "2.5": "2.9"}[inner]] = vertices[half[1]]

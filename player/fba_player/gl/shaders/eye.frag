@@ -71,8 +71,8 @@ void main() {
     // Lids shade the eyeball, the upper one most.
     float under = margin(in_head.x, lids[0]) - in_head.y;
     float above = in_head.y - margin(in_head.x, lids[1]);
-    float shade = smoothstep(-0.06, 0.40, under);
-    shade = (0.18 + 0.82 * shade) * (0.45 + 0.55 * smoothstep(-0.05, 0.20, above));
+    float shade = smoothstep(-0.06, 0.50, under);
+    shade = (0.14 + 0.86 * shade) * (0.45 + 0.55 * smoothstep(-0.05, 0.20, above));
     shade *= 1.0 - 0.45 * aside;
     // The iris is lit like a hollow: on the side away from the light.
     vec3 hollow = normalize(mix(n, normalize(n - 0.9 * (ball * vec3(at.xy, 0.0))), cornea));
@@ -93,5 +93,8 @@ void main() {
     float lit = smoothstep(0.02, 0.10, under);
     shown += spark * mix(0.55, 1.7, cornea) * vec3(1.0, 0.97, 0.93) * lit;
     shown += mix(FLOOR, SKY, mirrored.y * 0.5 + 0.5) * fresnel * (0.3 + 0.7 * shade);
+    // Tears stand along the lower lid.
+    float tears = smoothstep(0.0, 0.02, above) * (1.0 - smoothstep(0.02, 0.055, above));
+    shown += vec3(0.22) * tears * (0.4 + 0.6 * max(dot(n, KEY_DIRECTION), 0.0));
     pixel = vec4(encode(shown), 1.0);
 }

@@ -1,8 +1,10 @@
 /** Moves the vertices of a face by FAPs: what `fba.face.Deformer` does, with the motion of each FAP as few shapes. */
 import { checkedFap, checkedList, checkedNumber, checkedNumbers, refuse } from "./container.js";
+import { followGaze, readGazes } from "./lids.js";
 import { IDENTITY, multiply, rotate, setColumns, turnVector } from "./matrices.js";
 import { Shading, readParts } from "./parts.js";
 import { Rules } from "./resolve.js";
+import { Tongue } from "./tongue.js";
 import { ShapeWeights } from "../loader/weights.js";
 
 /** @typedef {import("./container.js").Arrays} Container */
@@ -41,8 +43,11 @@ export class Face {
     if (this._shapes.columns !== 3) refuse("has shapes that are not of three numbers");
     this._tracks = readTracks(header, this._rows, this._shapes.rows, this.parts);
     this._transforms = readTransforms(header, this.parts);
+    this._gazes = readGazes(checkedList(header.eyes ?? [], "eyes"));
+    this._tongues = checkedList(header.tongues ?? [], "tongues").map((tongue) => new Tongue(container, tongue, this.parts));
     const moving = new Uint8Array(count);
     for (const { row, rows } of this._tracks) for (let at = row; at < row + rows; at += 1) moving[this._rows[at]] = 1;
+    for (const { part } of this._tongues) moving.fill(1, this.parts[part].first, this.parts[part].first + this.parts[part].count);
     this._shadings = this.parts.map((part) => {
       const shading = new Shading(part, moving.subarray(part.first, part.first + part.count));
       part.normals.set(shading.rest);
@@ -64,19 +69,22 @@ export class Face {
   }
 
   /**
-   * Move the face: positions, normals, partMatrices and headMatrix. faps: 68 numbers, as a `Resolver` gives them.
+   * Move the face: positions, normals, partMatrices and headMatrix. Lids follow the gaze, and a tongue keeps between teeth and
+   * lips. faps: 68 numbers, as a `Resolver` gives them.
    * @param {ArrayLike<number>} faps
    */
   pose(faps) {
     this._faps.set(faps);
+    if (!this._mixer) followGaze(this._gazes, this._faps); // shapes that look up and down move lids
     this._values = this._mixer?.of(faps) ?? this._faps;
     this.positions.set(this._rest);
     this._touched.fill(0);
     for (const track of this._tracks) this._move(track);
+    this.parts.forEach((_, at) => composeTurns(this._transforms[at], this._faps, this.partMatrices[at]));
+    for (const tongue of this._tongues) if (tongue.bend(this, faps)) this._touched[tongue.part] = 1;
     this.parts.forEach((part, at) => {
       if (this._touched[at]) this._shadings[at].update(part.positions, part.normals);
       else if (this._was[at]) part.normals.set(this._shadings[at].rest);
-      composeTurns(this._transforms[at], this._faps, this.partMatrices[at]);
     });
     this._was.set(this._touched);
     composeTurns(this._transforms[this.parts.length], this._faps, this.headMatrix);

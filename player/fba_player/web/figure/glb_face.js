@@ -8,6 +8,7 @@ import { ADULT_EYES, Tracks, addSeams, commonHeader, eyeHeader, findBall, partHe
 import { bakeLight } from "./glb_light.js";
 import { shapedFace } from "./glb_shapes.js";
 import { IDENTITY } from "./matrices.js";
+import { findTongues } from "./tongue.js";
 
 /** What a `Figure` is made of. @typedef {{container: typeof MEMORY, header: Record<string, any>}} Content */
 /** @typedef {import("./fba_face.js").Point} Point */
@@ -78,6 +79,7 @@ async function describedFace(glb, content) {
   };
   addSeams(header, pieces.map(({ primitive }) => primitive.normals));
   const lips = ["2.2", "2.3"].map(bound);
+  header.tongues = findTongues(header, bound, factor * apart, factor * units.MNS * PER_DISTANCE);
   header.light = bakeLight(header, Math.min(...lips) < 0 ? [] : lips, factor * units.ENS * PER_DISTANCE);
   return header;
 }
