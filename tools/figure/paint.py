@@ -34,6 +34,8 @@ SCALP = np.array([112, 86, 73.0])
 AXIS = -0.085
 """z of the vertical axis around which the angles of the hairline are measured."""
 CROWN = np.array([0.004, 0.104, -0.118])
+HAIR_WIDTH = 0.00023
+"""Metres."""
 THICKNESS = 0.0035
 BROW = np.array([
     # along the left brow: x, y, extent downwards and upwards (mm)
@@ -130,10 +132,7 @@ def paint(chart: Chart) -> Image.Image:
     hair = scalp(p, 0.011)
     speckle = 0.5 + 0.5 * noise(p, 0.0009, 31)
     cover = smoothstep(hair * 1.25 - 0.55 * speckle * (1 - hair))
-    # Strokes of hair end at the seam of the texture, at the back of the head; a darker scalp hides it.
-    seam = np.exp(-((p[:, 0] / 0.003) ** 2)) * (p[:, 2] < -0.12)
-    colour = _blend(colour, HAIR, hair * seam * 0.25)
-    scalp_share = 0.72 * (cover * (1 - 0.3 * seam))[:, None]
+    scalp_share = 0.72 * cover[:, None]
     colour = colour * (1 - scalp_share) + SCALP * scalp_share
     brow_share = 0.30 * brow(p)[1][:, None]
     colour = colour * (1 - brow_share) + HAIR * brow_share
@@ -142,7 +141,8 @@ def paint(chart: Chart) -> Image.Image:
     image = _fill_unknown(image, chart.known)
     picture = Image.fromarray(np.clip(image, 0, 255).astype(np.uint8))
     _strokes(picture, chart)
-    return picture
+    filled = _fill_unknown(np.asarray(picture, dtype=np.float64), chart.known)
+    return Image.fromarray(filled.astype(np.uint8))
 
 
 def encode_jpeg(picture: Image.Image, quality: int = 88) -> bytes:
@@ -234,7 +234,6 @@ def _strokes(picture: Image.Image, chart: Chart) -> None:
     solid = chart.known & (area < 1e-6) & (area > 1e-12)
     rows, columns = np.nonzero(solid)
     p = chart.positions_at[rows, columns]
-    layers = []
     hair = scalp(p, 0.012)
     weight = area[rows, columns] * np.clip(hair * 1.15 - 0.1, 0, 1)
     chosen = random.choice(len(p), 130000, p=weight / weight.sum())
@@ -243,7 +242,8 @@ def _strokes(picture: Image.Image, chart: Chart) -> None:
     direction = _unit(away + whorl + random.normal(0, 0.018, away.shape)) * random.uniform(
         0.002, 0.0045, (len(chosen), 1)
     )
-    layers.append((chosen, direction, 0.66))
+    other, back = _across_the_seam(p, chosen, direction)
+    layers = [(np.concatenate([chosen, other]), np.concatenate([direction, back]), 0.66)]
     along, density = brow(p)
     weight = area[rows, columns] * density**1.2
     chosen = random.choice(len(p), 2600, p=weight / weight.sum())
@@ -256,11 +256,34 @@ def _strokes(picture: Image.Image, chart: Chart) -> None:
             step_x[rows[chosen], columns[chosen]], step_y[rows[chosen], columns[chosen]], direction
         )
         good = np.abs(move).max(axis=1) < 60
-        for (x0, y0), (dx, dy) in zip(roots[good] * 2, move[good] * 2, strict=True):
-            draw.line((x0 - dx / 2, y0 - dy / 2, x0 + dx / 2, y0 + dy / 2), fill=255, width=2)
+        # Where texels are small, a hair is wide in texels.
+        wide = np.clip(np.round(2 * HAIR_WIDTH / np.sqrt(area[rows[chosen], columns[chosen]])), 1, 8)
+        for (x0, y0), (dx, dy), width in zip(roots[good] * 2, move[good] * 2, wide[good], strict=True):
+            draw.line((x0 - dx / 2, y0 - dy / 2, x0 + dx / 2, y0 + dy / 2), fill=255, width=int(width))
         blurred = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
         faded = blurred.point(lambda value, s=strength: int(value * s))
         picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in HAIR)), (0, 0), faded)
+
+
+def _across_the_seam(p: Float64, chosen: Integer, direction: Float64) -> tuple[Integer, Float64]:
+    """Return texels (M,) and directions (M, 3) of the hairs that cross the middle of the back of the head.
+
+    There the texture has its seam, so that such a hair is drawn on both of its sides: at each end anew.
+    """
+    from scipy.spatial import cKDTree
+
+    root = p[chosen]
+    found = []
+    for side in (1, -1):
+        tip = root + direction * (0.5 * side)
+        crosses = np.flatnonzero((root[:, 0] * tip[:, 0] < 0) & (root[:, 2] < AXIS))
+        for sign in (1, -1):
+            there = np.flatnonzero((p[:, 0] * sign > 0) & (np.abs(p[:, 0]) < 0.006) & (p[:, 2] < AXIS))
+            of = crosses[tip[crosses, 0] * sign > 0]
+            _, nearest = cKDTree(p[there]).query(tip[of])
+            found.append((there[nearest], direction[of]))
+    texels, directions = zip(*found, strict=True)
+    return np.concatenate(texels), np.concatenate(directions)
 
 
 def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Float64:

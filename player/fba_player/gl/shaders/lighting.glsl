@@ -1,12 +1,14 @@
-// A studio: a large warm key light from the upper left, a cool fill, a rim light from behind, and a
-// dome that is brighter above than below. Everything in linear light; `encode` turns it into sRGB.
+// A studio: a large warm key light from the upper left, a cool fill, a soft light and a rim light from behind,
+// and a dome that is brighter above than below. Everything in linear light; `encode` turns it into sRGB.
 uniform vec3 eye;
 
 const vec3 KEY_DIRECTION = normalize(vec3(0.70, 0.68, 0.80));
 const vec3 FILL_DIRECTION = normalize(vec3(-0.9, 0.15, 0.6));
+const vec3 BACK_DIRECTION = normalize(vec3(0.45, 0.35, -0.95));
 const vec3 RIM_DIRECTION = normalize(vec3(-0.55, 0.50, -0.85));
 const vec3 KEY = vec3(1.78, 1.66, 1.53);
 const vec3 FILL = vec3(0.27, 0.275, 0.29);
+const vec3 BACK = vec3(0.46, 0.46, 0.48);
 const vec3 RIM = vec3(0.76, 0.80, 0.86);
 const vec3 SKY = vec3(0.46, 0.47, 0.50);
 const vec3 FLOOR = vec3(0.20, 0.175, 0.16);
@@ -30,7 +32,7 @@ vec3 lit(vec3 place, vec3 normal, vec4 colour) {
     float key = dot(n, KEY_DIRECTION);
     vec3 wrap = mix(vec3(0.12), vec3(0.34, 0.17, 0.12), min(colour.a * 2.5, 1.0));
     vec3 diffuse = KEY * max((vec3(key) + wrap) / (1.0 + wrap), 0.0) * 0.80;
-    diffuse += FILL * max(dot(n, FILL_DIRECTION) * 0.75 + 0.25, 0.0);
+    diffuse += FILL * max(dot(n, FILL_DIRECTION) * 0.75 + 0.25, 0.0) + BACK * max(dot(n, BACK_DIRECTION), 0.0);
     diffuse += mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.52;
     vec3 halfway = normalize(KEY_DIRECTION + view);
     float facing = max(dot(n, view), 0.0);
@@ -100,7 +102,8 @@ vec3 diffuse(vec3 n, vec3 albedo, vec4 reach, float scatter) {
     // In folds, light is reflected again, and red light passes through flesh.
     vec3 open = reach.y * (1.0 + (1.0 - reach.y) * 0.85 * albedo);
     open += (1.0 - reach.y) * vec3(0.24, 0.10, 0.085) * scatter;
-    vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0) + mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62;
+    vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0) + BACK * max(dot(n, BACK_DIRECTION), 0.0);
+    dome += mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62;
     float rim = max(dot(n, RIM_DIRECTION), 0.0) * reach.w;
     return KEY * key + dome * open + RIM * (rim + vec3(1.5, 0.32, 0.16) * (reach.z * scatter));
 }
