@@ -58,6 +58,8 @@ EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
 LASH_SHARE = 0.2
 """The same for lashes: a hair has little area, yet its lack is seen."""
+TEETH_SHARE = 0.5
+"""The same for teeth, which stand out against the dark behind them."""
 SMOOTHING = 0.3
 """Weight of the interpolated motion of a vertex compared to that of each vertex that it stands for."""
 LEAST_AREA = 0.1
@@ -225,7 +227,7 @@ def _importance(model: FaceModel) -> Float64:
             rows = mesh.vertices + model.starts[mesh.part]
             most = max(float(moved.max()), 1e-30) / (LID_SHARE if table.fap in LID_FAPS else 1.0)
             share[rows] = np.maximum(share[rows], moved / most)
-    for kind, counts in (("eye", EYE_SHARE), ("lash", LASH_SHARE)):
+    for kind, counts in (("eye", EYE_SHARE), ("lash", LASH_SHARE), ("teeth", TEETH_SHARE)):
         for part in model.of_kind(kind):
             start = model.starts[part.name]
             share[start : start + len(part.vertices)] = counts
