@@ -21,7 +21,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Array, Float64, Int16, Int64
-from fba.audio.mono import read_mono
+from fba.audio import read_mono
 from fba.codec import decode
 from fba.errors import FbaError, FbaWarning
 from fba.face import Deformer, FaceModel, resolve

@@ -1,4 +1,10 @@
 """Sound as arrays: any part of a file that FFmpeg reads, and the mono sound that speech is found in.
 
-Nothing here knows faces, streams or devices.
+Nothing here knows faces, streams or devices. PyAV is imported where a file is opened.
 """
+
+from fba.audio._mono import read_mono
+from fba.audio._pyav import av_version, import_av
+from fba.audio._sound_file import CHANNELS, SoundFile, open_sound
+
+__all__ = ["CHANNELS", "SoundFile", "av_version", "import_av", "open_sound", "read_mono"]

@@ -267,7 +267,7 @@ def find_offset(audio: Path | None, files: tuple[Path, ...], sound: SoundOptions
     """
     if audio is None or audio not in files:
         return sound.audio_offset
-    from fba.audio.sound_file import SoundFile
+    from fba.audio import SoundFile
 
     planes = next((float(each.start) for each in _tracks(audio) if each.is_fba), 0.0)
     with SoundFile(audio) as heard:

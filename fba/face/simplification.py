@@ -51,7 +51,7 @@ IMPORTANCE = 300.0
 LID_FAPS = (19, 20, 21, 22)
 LID_MARGINS = tuple(f"{side} {lid} lid" for side in ("left", "right") for lid in ("upper", "lower"))
 MARGIN_SHARE = 0.5
-"""Share of the triangles from which on the vertices of the margins of the lids stay."""
+"""The vertices of the margins of the lids stay while at least this share of the triangles is left."""
 LID_SHARE = 4.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5

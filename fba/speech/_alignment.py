@@ -258,7 +258,7 @@ def _later(phones: Iterable[Phone], seconds: float) -> list[Phone]:
 
 
 def _within(phones: Iterable[Phone], seconds: float) -> Iterator[Phone]:
-    """Yield phones cut to the sound, with silence where there is none."""
+    """Yield phones cut to the sound, and silence between them."""
     at = 0.0
     for phone in phones:
         start, end = max(phone.start, at), min(phone.end, seconds)

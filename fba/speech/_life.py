@@ -30,7 +30,7 @@ ACCENTS_APART = 0.7
 BLINK_PERIOD = 3.6
 """Seconds after which eyes blink without a pause."""
 PAUSE = 0.18
-"""Seconds from which on silence is a pause."""
+"""Least length of a pause, seconds."""
 
 _PARTS = {
     "nod": {"head_pitch": NOD},

@@ -14,9 +14,9 @@ WINDOW = 640
 LOWEST, HIGHEST = 70, 400
 """Hz of voices."""
 FULL = 32_760
-"""Sample from which on a sound is at full scale."""
+"""Least magnitude of a sample at full scale."""
 VOICED = 0.45
-"""Autocorrelation from which on a window has a pitch."""
+"""Least autocorrelation of a window with a pitch."""
 
 
 class Prosody:

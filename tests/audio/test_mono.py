@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fba.arrays import Int16
-from fba.audio.mono import read_mono
+from fba.audio import read_mono
 from fba.errors import DisplayError
 
 

@@ -118,7 +118,7 @@ def test_joints_without_channels_in_many_frames(tmp_path: Path) -> None:
 @pytest.mark.parametrize("rate", [1, 999, 1_000_001, 537_000_000])
 def test_a_sound_of_a_rate_that_no_device_has(tmp_path: Path, rate: int) -> None:
     pytest.importorskip("av")
-    from fba.audio.sound_file import SoundFile
+    from fba.audio import SoundFile
 
     path = tmp_path / "a.wav"
     with wave.open(str(path), "wb") as file:
@@ -133,7 +133,7 @@ def test_a_sound_of_a_rate_that_no_device_has(tmp_path: Path, rate: int) -> None
 @pytest.mark.parametrize("channels", [64, 4095])
 def test_more_channels_than_can_be_mixed(tmp_path: Path, channels: int) -> None:
     pytest.importorskip("av")
-    from fba.audio.sound_file import SoundFile
+    from fba.audio import SoundFile
 
     path = tmp_path / "a.wav"
     with wave.open(str(path), "wb") as file:

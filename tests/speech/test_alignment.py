@@ -14,7 +14,7 @@ import pytest
 
 from bench.speech import SENTENCES, VOICES, add_noise, speak, start_errors, telephone, visemes
 from fba.arrays import Int16
-from fba.audio.mono import read_mono
+from fba.audio import read_mono
 from fba.errors import FormatError, UnsupportedError
 from fba.speech import RATE, Phone, Prosody, find_shapes, find_speech, split_text
 from fba.speech._pieces import cut_at_pauses, measure_loudness

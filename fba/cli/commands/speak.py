@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 SHARE = click.FloatRange(0, 1)
 MOST_TEXT_BYTES = 1 << 24
 WELL_HEARD = 0.8
-"""Share of a text's words from which on nothing is said of the others."""
+"""Nothing is said of missing words where at least this share of a text's words is heard."""
 CLIPPED = 0.001
-"""Share of samples at full scale from which on a recording counts as clipped."""
+"""A recording with at least this share of its samples at full scale counts as clipped."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,7 +217,7 @@ def _speak(text: str, sound: Path, said: _Said, outputs: Outputs) -> str:
 
 
 def _listen(sound: Path, words: Any, language: str) -> tuple[Speech, Prosody]:
-    from fba.audio.mono import read_mono
+    from fba.audio import read_mono
     from fba.speech import RATE, Prosody, find_speech
 
     prosody = Prosody()
@@ -238,7 +238,7 @@ def _listen(sound: Path, words: Any, language: str) -> tuple[Speech, Prosody]:
 
 
 def _measure(sound: Path) -> Prosody:
-    from fba.audio.mono import read_mono
+    from fba.audio import read_mono
     from fba.speech import RATE, Prosody
 
     prosody = Prosody()

@@ -70,7 +70,7 @@ class VoiceOptions:
 
 def place_voice(given: VoiceOptions, taken: Inputs, target: Path) -> Voice:
     """Return the given sound with its begin; FormatError for a file that is no sound, or of another time."""
-    from fba.audio.sound_file import SoundFile
+    from fba.audio import SoundFile
     from fba.formats.time_codes import seconds_between
     from fba_player.sound.sound_clip import read_time_of_day
 

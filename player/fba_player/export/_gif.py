@@ -13,7 +13,7 @@ import numpy as np
 
 from fba.arrays import UInt8
 from fba.atomic import PathLike, atomic_path, write_error
-from fba.audio.pyav import import_av
+from fba.audio import import_av
 
 MAX_DEFAULT_RATE = Fraction(25)
 """Largest default frame rate; some browsers slow down above 50."""

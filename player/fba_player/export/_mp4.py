@@ -10,7 +10,7 @@ from typing import Any
 
 from fba.arrays import UInt8
 from fba.atomic import PathLike, atomic_path, write_error
-from fba.audio.pyav import av_version, import_av
+from fba.audio import av_version, import_av
 from fba.errors import DisplayError
 from fba_player.sound.soundtrack import FilmedSound, Soundtrack
 

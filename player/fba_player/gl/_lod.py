@@ -205,7 +205,7 @@ def _faces(meshes: list[FaceMesh]) -> list[list[int]]:
 def _mean(values: Float32, rows: Int32, weights: Float32) -> Float32:
     """Return the weighted means (M, C) of rows (M, 3) of values (V, C).
 
-    IndexError where a row is none of the values.
+    IndexError where a row is not among the values.
     """
     result = np.zeros((len(rows), values.shape[1]), dtype=np.float32)
     for i in range(len(rows)):

@@ -14,7 +14,7 @@ from fba.errors import FbaError
 from fba_player.view.protocols import Closing
 
 if TYPE_CHECKING:
-    from fba_player.sound.audio_file import SoundFile
+    from fba.audio import SoundFile
 
 BUCKETS_PER_SECOND = 100
 """Pairs of lowest and highest samples in a second, at first."""
@@ -68,7 +68,7 @@ class Peaks(Closing):
 
     def _run(self) -> None:
         try:
-            from fba_player.sound.audio_file import SoundFile
+            from fba.audio import SoundFile
 
             with SoundFile(self._path) as file:
                 self._read(file)

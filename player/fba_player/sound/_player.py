@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from fba.atomic import PathLike
-from fba.audio.sound_file import CHANNELS, SoundFile
+from fba.audio import CHANNELS, SoundFile
 from fba.errors import FbaWarning
 from fba_player.gl._context import cure
 from fba_player.playback._transport import Transport

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from fba.arrays import Int16
-from fba.audio.sound_file import CHANNELS, SoundFile
+from fba.audio import CHANNELS, SoundFile
 from fba.errors import FbaError
 from fba_player.playback._playhead import Motion
 

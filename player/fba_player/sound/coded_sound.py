@@ -11,8 +11,7 @@ import numpy as np
 
 from fba.arrays import Int64
 from fba.atomic import PathLike
-from fba.audio.pyav import import_av
-from fba.audio.sound_file import SoundFile, open_sound
+from fba.audio import SoundFile, import_av, open_sound
 from fba.carriage.mp4 import SoundTrack
 from fba.errors import DisplayError, FormatError
 from fba_player.sound.soundtrack import AAC_FRAME, AAC_RATES, make_frame

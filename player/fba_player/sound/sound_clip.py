@@ -11,8 +11,7 @@ import numpy as np
 
 from fba.arrays import Int16
 from fba.atomic import PathLike
-from fba.audio.pyav import import_av
-from fba.audio.sound_file import open_sound
+from fba.audio import import_av, open_sound
 from fba.formats.time_codes import parse_time_code
 from fba_player.sound.soundtrack import AAC_FRAME, Soundtrack
 

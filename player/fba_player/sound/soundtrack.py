@@ -13,8 +13,7 @@ import numpy as np
 
 from fba.arrays import Float32, Int16
 from fba.atomic import PathLike
-from fba.audio.pyav import import_av
-from fba.audio.sound_file import CHANNELS, SoundFile, open_sound
+from fba.audio import CHANNELS, SoundFile, import_av, open_sound
 from fba.errors import FormatError
 from fba_player.playback._transport import Transport
 from fba_player.sound._mixer import SoundMixer

@@ -16,7 +16,7 @@ import pytest
 
 import fba
 from fba.arrays import Float64
-from fba.audio.sound_file import SoundFile
+from fba.audio import SoundFile
 from fba.carriage.mp4 import list_tracks, read_mp4, write_mp4
 from fba.cli.scenes import SoundOptions, find_offset, find_sound
 from fba.codec import encode_animation, marked_table

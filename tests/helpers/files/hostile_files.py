@@ -379,7 +379,7 @@ def load_definition(path: Path) -> object:
 
 def read_sound(path: Path) -> object:
     """Read a sound, a second at a time."""
-    from fba.audio.sound_file import SoundFile
+    from fba.audio import SoundFile
 
     with SoundFile(path) as sound:
         at = 0

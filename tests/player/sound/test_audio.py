@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba.audio.sound_file import SoundFile
+from fba.audio import SoundFile
 from fba.errors import FbaWarning, FormatError
 from fba_player.playback._playhead import Motion
 from fba_player.playback._timeline import Timeline

@@ -12,7 +12,7 @@ import numpy as np
 
 from fba.arrays import Int16
 from fba.atomic import PathLike
-from fba.audio.pyav import av_version, import_av
+from fba.audio._pyav import av_version, import_av
 from fba.errors import FbaWarning, FormatError
 
 CHANNELS = 2

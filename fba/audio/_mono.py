@@ -11,7 +11,7 @@ import numpy as np
 
 from fba.arrays import Float32, Int16
 from fba.atomic import PathLike
-from fba.audio.sound_file import SoundFile
+from fba.audio._sound_file import SoundFile
 from fba.errors import DisplayError
 
 BLOCK_SECONDS = 1.0
