@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -75,3 +76,11 @@ def shared() -> Path:
     if not (path / "vectors" / "index.json").is_file():
         pytest.skip(f"no shared test material at {path}; set FBA_SHARED to its folder")
     return path
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Let programs be interrupted in the background, too, where they ignore Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

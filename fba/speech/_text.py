@@ -78,7 +78,7 @@ def _check_script(text: str, language: str) -> None:
                 script = unicodedata.name(letter).split()[0].title()
                 raise FormatError(
                     f"the text has letters of the {script} script, which {language} does not use; name its "
-                    "language with --language, or write it in Latin letters",
+                    "language, or write it in Latin letters",
                     line=number,
                     token=line.strip(),
                 )

@@ -29,7 +29,7 @@ def find_program(name: str | None = None) -> str:
             return path
     raise UnsupportedError(
         f"no program that speaks was found: install {name or 'flite or espeak-ng'} with the packages of your "
-        "system, or give a recording with --audio"
+        "system, or give a recording"
     )
 
 

@@ -151,6 +151,7 @@ def test_a_folder_converted_on_a_cluster(tmp_path: Path) -> None:
     assert len({path.read_bytes() for path in out.glob("*.fba")}) == 1
 
 
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("stopped", ["Ctrl-C", "the scheduler ends"])
 def test_what_a_stopped_batch_has_recorded_is_not_converted_again(tmp_path: Path, stopped: str) -> None:
     captures, out = tmp_path / "captures", tmp_path / "out"

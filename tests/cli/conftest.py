@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import signal
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -83,11 +82,3 @@ Frame Time: 0.1
     path = tmp_path / "walk.bvh"
     path.write_text(text)
     return path
-
-
-@pytest.fixture
-def interruptible() -> Iterator[None]:
-    """Let programs be interrupted in the background, too, where they ignore Ctrl-C."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)

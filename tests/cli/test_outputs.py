@@ -72,7 +72,7 @@ def test_every_file_that_a_command_writes_is_an_output() -> None:
     assert writing == {
         "encode", "decode", "convert", "render", "gait", "model import", "model fit", "model photos",
         "model points", "conformance", "capture", "markers", "express", "model learn-fit", "model simplify",
-        "emote", "emotion", "persona learn", "persona play", "export", "send", "find",
+        "emote", "emotion", "persona learn", "persona play", "export", "send", "find", "speak",
     }  # fmt: skip
 
 
@@ -114,6 +114,9 @@ OVERWRITING = [
     "find IN.png both.fba -o OUT",
     "find face.fap IN.png -o OUT",
     "find --build OUT IN.npz",
+    "speak --audio IN.wav -o OUT",
+    "speak --timings IN.json -o OUT",
+    "speak --text-file IN.txt -o OUT",
     "send IN.fap rtp://127.0.0.1:50299 --sdp OUT",
 ]
 

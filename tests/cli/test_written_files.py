@@ -98,7 +98,7 @@ def test_another_body_and_axes(run: Run, tmp_path: Path, stream: Path) -> None:
         (["--fap", "a.fap", "--to", "bvh"], "--to says how to write --output"),
         (["-o", "a.fba"], "fba convert and fba encode write them"),
         (["-o", "."], "name the format with --to"),
-        ([], "--fap, --bap, --epf, --output"),
+        ([], "--fap, --bap, --epf, --visemes, --output"),
     ],
 )
 def test_options_that_do_not_fit(

@@ -16,14 +16,14 @@ from fba.body.plausibility import find_doubt
 from fba.formats import step_choice
 from fba.formats.step_choice import LIKELY, UNSURE, StepChoice, choose_steps
 from fba.parameters import bap_numbers
-from tests.helpers.made_streams import made_streams
+from made_streams import made_streams
 
 UNTOLD = {"real/perfumist_basicMotion.fba"}
 """The foreign stream in the other table in which nothing shows that: arms and fingers move less."""
 
 
 def test_made_streams() -> None:
-    """The first 16 of those of which `python -m tests.helpers.made_streams 500` tries more."""
+    """The first 16 of those of which `python tests/helpers/made_streams.py 500` tries more."""
     seen = set()
     for made in made_streams(16):
         assert choose_steps(made.marked) == StepChoice(made.table, "the stream says so")

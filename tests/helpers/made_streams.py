@@ -1,6 +1,6 @@
 """Streams with bodies of many kinds, made with either table of BAP steps, to try how the table is chosen.
 
-`python -m tests.helpers.made_streams 500` makes that many, and prints how often the choice is right with the
+`python tests/helpers/made_streams.py 500` makes that many, and prints how often the choice is right with the
 mark and without it.
 """
 

@@ -131,7 +131,7 @@ class TestMemory:
                         offscreen.draw(step % 20 / 10)
                         scene.show(name, SWITCHES[name].default)
 
-            for number in range(64):  # each gets a shape of its own, until the caches of shapes are full
+            for number in range(512):  # each gets a shape of its own, until the caches of shapes are full
                 scene.show("influence", 3 + number % 2)
                 offscreen.draw(0.0)
                 scene.show("influence", SWITCHES["influence"].default)

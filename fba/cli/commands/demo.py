@@ -62,12 +62,12 @@ def command(
 
     folder = out if out is not None else Path(tempfile.mkdtemp(prefix="fba-demo-"))
     folder.mkdir(parents=True, exist_ok=True)
-    surface = None if play is False else _open_window(asked=play is True)
     stream, video, picture = (folder / f"hello{suffix}" for suffix in (".fba", ".mp4", ".png"))
     sources = [folder / name for name in SAMPLES]
     capture, talk = folder / CAPTURE, folder / "talk.fba"
     made = (*sources, capture, stream, talk, video, picture)
     outputs = Outputs([Output("--out", path) for path in made], no_clobber=no_clobber)
+    surface = None if play is False else _open_window(asked=play is True)
     compiling = Timer(SECONDS_BEFORE_NOTICE, click.echo, [COMPILING], {"err": True})
     compiling.daemon = True
     compiling.start()

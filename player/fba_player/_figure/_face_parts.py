@@ -131,7 +131,7 @@ def coarse_shapes(model: FaceModel, part: Part, shape: FaceShape) -> tuple[Coars
         coarse = replace(
             shape,
             triangles=own.triangles,
-            colours=part_colours(own, part.material.colour),
+            colours=np.einsum("nk,nkc->nc", weights, shape.colours[corners]).astype(shape.colours.dtype),
             sway=np.einsum("nk,nk->n", weights, shape.sway[corners]).astype(np.float32),
             texcoords=own.texcoords if shape.texcoords is not None else None,
             wrinkle_places=None if places is None else place_wrinkles(model, own),

@@ -380,7 +380,7 @@ def test_same_without_machine_code() -> None:
         import sys
         import numpy as np
         from fba.compiled import is_compiled
-        from tests.face.deform.test_deformer_normals import frame, lively, shaded
+        from test_deformer_normals import frame, lively, shaded
 
         frames = np.stack([frame(f31=70, f49=20_000), frame(f31=-40)])
         deformer = lively()
@@ -388,11 +388,10 @@ def test_same_without_machine_code() -> None:
             np.savez(file, *shaded(deformer, frames), deformer.feature_points(frames), is_compiled())
         """
     )
-    root = Path(__file__).parents[3]
-    results = []
+    here, results = str(Path(__file__).parent), []
     with tempfile.TemporaryDirectory() as folder:
         for disabled in ("0", "1"):
-            environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled, "PYTHONPATH": str(root)}
+            environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled, "PYTHONPATH": here}
             path = Path(folder) / f"{disabled}.npz"
             subprocess.run(
                 [sys.executable, "-W", "error", "-c", script, str(path)], env=environment, check=True

@@ -199,6 +199,7 @@ def tongue_poses() -> Iterator[dict[int, float]]:
         yield {**mouth, 44: -900, 45: 900, 46: 400}
 
 
+@pytest.mark.slow
 def test_the_tongue_pierces_no_skin(marks: Landmarks, figure: FaceFigure) -> None:
     edges, skin = inner_edges(figure), outer_skin(marks)
     for values in tongue_poses():
@@ -264,6 +265,7 @@ def test_frames_of_a_stream_keep_tongue_and_teeth_inside(
         assert pierced(figure.pose(frames[frame].astype(np.float32)).positions, edges, skin) == 0, frame
 
 
+@pytest.mark.slow
 def test_faps_of_the_mouth_keep_tongue_and_teeth_inside(marks: Landmarks, figure: FaceFigure) -> None:
     edges, skin = inner_edges(figure), outer_skin(marks)
     for parameter in parameters()[2:]:

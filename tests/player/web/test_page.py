@@ -140,7 +140,7 @@ def test_pictures_are_those_of_the_desktop_player(browse: Browse, what: str, tmp
     for frame in frames:
         theirs = tmp_path / f"desktop{frame}.png"
         arguments = ["render", str(file), "-o", str(theirs), "--frame", str(frame)]
-        done = CliRunner().invoke(group, [*arguments, "--camera", view, "--size", "640x480"])
+        done = CliRunner().invoke(group, [*arguments, "--camera", view, "--size", "640x480", "--lod", "full"])
         assert done.exit_code == 0, done.output
         shown, wanted = (
             np.asarray(Image.open(path).convert("RGB")).astype(np.int16)[:rows]
