@@ -50,34 +50,38 @@ def _read_wave(path: PathLike, rate: int) -> Iterator[Int16]:
             while data := file.readframes(own):
                 samples = np.frombuffer(data[: len(data) // (2 * channels) * 2 * channels], dtype="<i2")
                 yield resampler(_mix(samples.reshape(-1, channels)))
+            yield resampler(np.zeros(0, dtype=np.int16), last=True)
     except (wave.Error, EOFError) as error:
         raise DisplayError(f"{path}: {error or 'is cut off'}; {needed}") from error
 
 
 class Resampler:
-    """Converts samples from one rate to another, block by block, with a delay of nothing.
+    """Converts samples from one rate to another, block by block, as if they were converted at once.
 
-    source, target: samples per second. Blocks are filtered one by one, with the end of the last one before
-    them.
+    source, target: samples per second. It holds back a tenth of a second, whose filter needs what follows.
     """
 
     def __init__(self, source: int, target: int) -> None:
         common = gcd(source, target)
         self._up, self._down = target // common, source // common
-        self._context: Float32 = np.zeros(0, dtype=np.float32)
-        self._kept = -(-source // 10 // self._down) * self._down  # a tenth of a second, whole periods
-        self._rest: Int16 = np.zeros(0, dtype=np.int16)
+        self._margin = -(-source // 10 // self._down) * self._down  # whole periods
+        self._held: Float32 = np.zeros(0, dtype=np.float32)
+        self._done = 0  # samples of those held that were converted
 
-    def __call__(self, samples: Int16) -> Int16:
-        """Return the resampled samples int16 of a block, as far as they are whole."""
+    def __call__(self, samples: Int16, *, last: bool = False) -> Int16:
+        """Return the samples int16 that are certain now. last: nothing follows."""
         if self._up == self._down:
             return samples
         from scipy.signal import resample_poly
 
-        samples = np.concatenate([self._rest, samples])
-        whole = len(samples) // self._down * self._down
-        self._rest = samples[whole:]
-        block = np.concatenate([self._context, samples[:whole].astype(np.float32)])
-        made = resample_poly(block, self._up, self._down)[len(self._context) // self._down * self._up :]
-        self._context = block[max(len(block) - self._kept, 0) :]
+        held = np.concatenate([self._held, samples.astype(np.float32)])
+        certain = (len(held) - self._margin) // self._down * self._down
+        end = len(held) if last else max(certain, self._done)
+        if end == self._done:
+            self._held = held
+            return np.zeros(0, dtype=np.int16)
+        made = resample_poly(held, self._up, self._down)
+        made = made[self._done // self._down * self._up : -(-end * self._up // self._down)]
+        start = max(end - self._margin, 0)
+        self._held, self._done = held[start:], end - start
         return np.asarray(np.clip(np.rint(made), -32768, 32767), dtype=np.int16)

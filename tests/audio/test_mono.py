@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import resample_poly
 
 from fba.arrays import Int16
 from fba.audio import read_mono
@@ -50,6 +51,22 @@ def test_a_tone_stays_a_tone(
     expected = 8000 * np.sin(2 * np.pi * 440 * np.arange(len(samples)) / 16000)
     middle = slice(200, -200)
     assert np.abs(samples[middle] - expected[middle]).max() < 400
+
+
+@pytest.mark.parametrize("rate", [8000, 22050, 44100, 96000])
+def test_blocks_leave_no_seams(rate: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the standard library, block by block, noise becomes what it becomes at once."""
+    without_pyav(monkeypatch)
+    noise = np.random.default_rng(4).integers(-9000, 9000, 3 * rate + 77).astype("<i2")
+    path = tmp_path / "noise.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, rate, len(noise), "NONE", ""))
+        file.writeframes(noise.tobytes())
+    common = np.gcd(rate, 16000)
+    whole = resample_poly(noise.astype(np.float64), 16000 // common, rate // common)
+    samples = read(path)
+    assert len(samples) == len(whole)
+    assert np.abs(samples - whole).max() < 1
 
 
 def test_other_files_need_pyav(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
