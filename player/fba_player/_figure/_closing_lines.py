@@ -1,4 +1,4 @@
-"""Where a face closes: lips and lids, which levels of detail must not open."""
+"""Where a face closes: along its lips and lids, where little light of the sky is left."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LINES = (
 )
 """Feature points around mouth and eyes, in order."""
 WIDTH = 0.035
-"""Distance from these lines within which vertices stay, in ES0."""
+"""Distance from these lines within which vertices lie along them, in ES0."""
 STEPS = 12
 """Points between two feature points at which the distance is measured."""
 
