@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,9 +55,10 @@ def test_a_stream_of_the_marked_part_is_exported(studio: Studio, tmp_path: Path)
     assert session.exports.now is not None, session.notices()
     assert session.unsaved
     finish(session)
+    said = [notice.text for notice in session.notices()]  # before they fade
     assert not session.unsaved
+    assert said[0] == "Saved as part.fba"
     assert len(fba.read(tmp_path / "part.fba")) == 4
-    assert session.notices()[0].text == "Saved as part.fba"
     StudioHand(studio).click(*panel.buttons["Export file"])  # it is not overwritten
     assert session.exports.now is None
     assert "exists already" in session.notices()[-1].text
@@ -72,6 +74,50 @@ def test_an_export_is_cancelled(studio: Studio, tmp_path: Path) -> None:
     assert session.exports.now is None
     assert not session.rolling
     assert list(tmp_path.iterdir()) == []
+
+
+def dialog_program(folder: Path, answer: str) -> None:
+    """Write a program named as one that shows dialogs, which does what shell commands say."""
+    program = folder / "bin" / "zenity"
+    program.parent.mkdir()
+    program.write_text(f"#!/bin/sh\n{answer}\n")
+    program.chmod(0o755)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have dialogs of their own")
+@pytest.mark.parametrize(("field", "answered"), [("open", True), ("export", True), ("export", False)])
+def test_the_answer_of_a_dialog_is_taken(
+    studio: Studio, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, field: str, answered: bool
+) -> None:
+    dialog_program(tmp_path, "echo /elsewhere/talk.fba" if answered else "exit 1")
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"), prepend=":")
+    panel = panel_of(studio)
+    panel._exported = "mine.fba"
+    studio.settle(2)
+    StudioHand(studio).click(*panel.buttons[f"browse {field}"])
+    assert "dialog" in studio.session.rolling  # the window goes on while it is open
+    begun = time.monotonic()
+    while "dialog" in studio.session.rolling:
+        assert time.monotonic() - begun < 120
+        studio.settle(1)
+    if field == "open":
+        assert "/elsewhere/talk.fba" in studio.session.notices()[-1].text
+    else:
+        assert panel._exported == ("/elsewhere/talk.fba" if answered else "mine.fba")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have dialogs of their own")
+def test_a_window_that_closes_ends_its_dialog(
+    studio: Studio, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialog_program(tmp_path, "exec sleep 1000")
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"), prepend=":")
+    studio.settle(2)
+    StudioHand(studio).click(*panel_of(studio).buttons["browse open"])
+    studio.session.open.discard("files")
+    begun = time.monotonic()
+    studio.settle(2)
+    assert time.monotonic() - begun < 500  # it did not wait for the program's end
 
 
 def test_without_a_program_for_dialogs_it_says_so(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:

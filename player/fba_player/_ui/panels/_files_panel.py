@@ -172,7 +172,9 @@ class FilesPanel(Panel):
             session.drop((Path(answer[0]),))
 
     def closed(self, session: Session) -> None:
-        """Forget a dialog that is open."""
+        """End a dialog that is open: forgetting one alone waits until the user has closed it."""
+        if self._dialog is not None:
+            self._dialog[1].kill()
         self._dialog = None
         session.rolling.discard("dialog")
 
