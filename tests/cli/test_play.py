@@ -213,7 +213,7 @@ def test_a_stream_that_is_cut_off_says_so(
 ) -> None:
     planes, _, _ = talk.read_bytes().partition(b"\0\0\1\xb1")
     pipe_in(monkeypatch, planes[:-16])
-    window.meanwhile = lambda scene: scene.animation.wait_end(20)
+    window.meanwhile = lambda scene: scene.animation.wait_end(300)
     cut = run("play", "-")
     assert cut.code == 0
     assert "warning: standard input: " in cut.err

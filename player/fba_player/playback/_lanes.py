@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Array, Float32, Float64, Int64, UInt8
 from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
+
+if TYPE_CHECKING:
+    from fba.codec import DecodedFrames
 
 JOINED_SECONDS = 1e-6
 """Seconds between two segments of a name that count as none."""
@@ -86,7 +90,7 @@ class Lane:
         return ", ".join(parts)
 
 
-def lane_of_visemes(animation: Animation) -> Lane | None:
+def lane_of_visemes(animation: Animation | DecodedFrames) -> Lane | None:
     """Return the visemes that frames send, with their shares of the blend; None without any."""
     face = animation.face
     if face is None:
@@ -96,7 +100,7 @@ def lane_of_visemes(animation: Animation) -> Lane | None:
     return _lane("visemes", animation, face.mask[:, 0], face.viseme[:, :2], shares, VISEMES)
 
 
-def lane_of_expressions(animation: Animation) -> Lane | None:
+def lane_of_expressions(animation: Animation | DecodedFrames) -> Lane | None:
     """Return the expressions that frames send, with their intensities; None without any."""
     face = animation.face
     if face is None:
@@ -106,7 +110,12 @@ def lane_of_expressions(animation: Animation) -> Lane | None:
 
 
 def _lane(
-    name: str, animation: Animation, sent: Array, selected: Array, shares: Array, labels: Sequence[str]
+    name: str,
+    animation: Animation | DecodedFrames,
+    sent: Array,
+    selected: Array,
+    shares: Array,
+    labels: Sequence[str],
 ) -> Lane | None:
     """Return the lane of two names in each frame, in force until the next ones are sent.
 

@@ -16,7 +16,7 @@ from typing import Any, Protocol, cast
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Int64
 from fba.choices import BapTableOrAuto
-from fba.codec import Block, Decoder, FrameBuffer, StreamInfo, marked_table
+from fba.codec import Block, DecodedFrames, Decoder, FrameBuffer, StreamInfo, marked_table
 from fba.errors import BitstreamError, FbaError, FbaWarning
 from fba.face import FaceSettings
 from fba.formats.step_choice import choose_steps
@@ -127,6 +127,11 @@ class LiveAnimation:
 
     def __len__(self) -> int:
         return len(self._now.index)
+
+    @property
+    def now(self) -> DecodedFrames:
+        """All that has arrived, at one moment; not copied."""
+        return self._now
 
     def snapshot(self) -> Animation:
         """Return a copy of what has arrived so far. Raises ValueError before the first frame."""

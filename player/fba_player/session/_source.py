@@ -25,7 +25,7 @@ from fba_player.session._timeline_trace import (
 )
 
 if TYPE_CHECKING:
-    from fba.codec import StreamInfo
+    from fba.codec import DecodedFrames, StreamInfo
     from fba_player.view.protocols import Showable
 
 REFRESH_SECONDS = 0.2
@@ -64,8 +64,7 @@ class Source:
         self._stamp = self._newer = self._stat()
         self.expressions: tuple[Stretch, ...] = ()
         """What the face shows when; empty until `probe` is done, and for live streams."""
-        self.lanes: tuple[Lane, ...] = ()
-        """What is said and felt when; empty until `probe` has found it, and for live streams."""
+        self._lanes: tuple[Lane, ...] = ()
         self.activity: Activity | None = None
         """Which groups move when; None until `probe` is done, and for live streams."""
 
@@ -122,10 +121,21 @@ class Source:
     @property
     def trace(self) -> Trace | None:
         """The graph behind the timeline: bits of planes, or amount of motion; None until `probe` is done."""
+        self._follow_live()
+        return self._trace
+
+    @property
+    def lanes(self) -> tuple[Lane, ...]:
+        """What is said and felt when; of files empty until `probe` has found it, of live streams what is sent."""
+        self._follow_live()
+        return self._lanes
+
+    def _follow_live(self) -> None:
+        """Bring the trace and the lanes of a live stream up to date with its information."""
         if self._live is not None and self._trace_info is not self.info:
             self._trace_info = self.info
             self._trace = trace_of_planes(self._trace_info)
-        return self._trace
+            self._lanes = _sent(self._live.now)
 
     def _info_of_scene(self) -> StreamInfo:
         from fba.codec import StreamInfo
@@ -162,9 +172,14 @@ class Source:
             trace = trace_of_motion(animation)
         self._trace = trace
         if isinstance(self._scene, Scene) and isinstance(animation, Animation):
-            sent = lane_of_visemes(animation), lane_of_expressions(animation)
-            self.lanes = tuple(lane for lane in sent if lane is not None)
+            self._lanes = _sent(animation)
             self.activity = read_activity(animation, self._scene.model)
             self.expressions = read_stretches(animation, self._scene.model)
             felt = lane_of_stretches(self.expressions)
-            self.lanes += () if felt is None else (felt,)
+            self._lanes += () if felt is None else (felt,)
+
+
+def _sent(animation: Animation | DecodedFrames) -> tuple[Lane, ...]:
+    """Return the lanes of visemes and expressions that frames send."""
+    lanes = lane_of_visemes(animation), lane_of_expressions(animation)
+    return tuple(lane for lane in lanes if lane is not None)

@@ -235,7 +235,7 @@ def test_a_picture_is_made_with_the_warning(
 
 def test_a_stream_that_arrives(run: Run, walk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def play(build: Any, **_: Any) -> tuple[()]:
-        assert build().animation.wait_end(20)
+        assert build().animation.wait_end(300)
         return ()
 
     class Stdin:

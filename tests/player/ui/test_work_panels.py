@@ -152,8 +152,8 @@ def test_the_bit_rate_of_a_stream_that_arrives(opengl: None, talking: Animation)
     from fba_player.playback.live import LiveAnimation, LiveTimeline
 
     live = LiveAnimation(BufferedReader(BytesIO(fba.encode(talking))))  # type: ignore[arg-type]
-    assert live.wait(20)
-    assert live.wait_end(20)
+    assert live.wait(300)
+    assert live.wait_end(300)
     scene = Scene(live, timeline=LiveTimeline(live))  # type: ignore[arg-type]
     session = Session(scene, Transport(scene.timeline), source=Source(scene), size=SIZE)  # type: ignore[arg-type]
     session.open.add("rate")
@@ -176,7 +176,7 @@ def test_losses_are_told_while_the_bar_is_hidden(opengl: None, talking: Animatio
     from fba_player.playback.live import LiveAnimation, LiveTimeline
 
     live = LiveAnimation(BufferedReader(BytesIO(fba.encode(talking))))  # type: ignore[arg-type]
-    assert live.wait_end(20)
+    assert live.wait_end(300)
     now = [100.0]
     scene = Scene(live, timeline=LiveTimeline(live))  # type: ignore[arg-type]
     transport = Transport(scene.timeline, loop=True, clock=lambda: now[0])

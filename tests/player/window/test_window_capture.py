@@ -21,7 +21,7 @@ def test_the_newest_values_are_shown_while_it_plays_at_its_end() -> None:
     frames = [{3: 10 * t} for t in range(100)]
     data = fba.encode(Animation(25, np.arange(100), face=face_track(frames)))  # type: ignore[arg-type]
     live = LiveAnimation(io.BufferedReader(io.BytesIO(data)))  # type: ignore[arg-type]
-    assert live.wait_end(20)
+    assert live.wait_end(300)
     assert live.wait()
     live.growing = True  # as before its end
     now = [0.0]

@@ -42,13 +42,13 @@ def test_a_stream_is_shown_while_it_arrives(on_display: str, tmp_path: Path) -> 
     with os.fdopen(read, "rb") as source, os.fdopen(write, "wb", buffering=0) as sender:
         sender.write(data[:middle])
         live = LiveAnimation(source, name="wire")
-        assert live.wait(20)
+        assert live.wait(300)
         with window_of(Scene(live, timeline=LiveTimeline(live)), tmp_path) as window:  # type: ignore[arg-type]
             settle(window)
             pictures, length = window.pictures, window.transport.duration
             sender.write(data[middle:])
             sender.close()
-            assert live.wait_end(20)
+            assert live.wait_end(300)
             until(window, lambda: window.pictures > pictures)  # though it is paused
             assert window.transport.duration > length
             assert window.transport.time == 0.0
@@ -63,7 +63,7 @@ def test_a_stream_that_is_read_with_other_steps_is_noticed_once(on_display: str,
         io.BytesIO(fba.encode(gait.walk(), fba.EncoderOptions(bap_steps="visage", mark=False)))
     )  # type: ignore[arg-type]
     live = LiveAnimation(stream, name="wire")
-    assert live.wait_end(20)
+    assert live.wait_end(300)
     with window_of(Scene(live, timeline=LiveTimeline(live)), tmp_path) as window:  # type: ignore[arg-type]
         until(window, window.session.notices)
         (notice,) = window.session.notices()
