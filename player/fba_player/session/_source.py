@@ -126,7 +126,7 @@ class Source:
 
     @property
     def lanes(self) -> tuple[Lane, ...]:
-        """What is said and felt when; of files empty until `probe` has found it, of live streams what is sent."""
+        """What is said and felt when; of files empty until `probe` is done, of live streams what is sent."""
         self._follow_live()
         return self._lanes
 
