@@ -159,22 +159,26 @@ def pierced(positions: Float32, edges: Intp, triangles: Intp) -> int:
     start = positions[edges[:, 0]].astype(np.float64)
     way = positions[edges[:, 1]] - start
     corner = positions[triangles].astype(np.float64)
-    low, high = np.minimum(start, start + way).min(axis=0), np.maximum(start, start + way).max(axis=0)
-    near = (corner.max(axis=1) >= low).all(axis=1) & (corner.min(axis=1) <= high).all(axis=1)
-    return sum(int(_crossings(start, way, each).sum()) for each in corner[near])
+    middle = corner.mean(axis=1)
+    reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
+    reach += np.linalg.norm(way, axis=1).max() / 2
+    near = cKDTree(start + way / 2).query_ball_point(middle, reach)
+    pairs = np.repeat(np.arange(len(triangles)), [len(those) for those in near])
+    edge = np.concatenate([np.asarray(those, dtype=np.intp) for those in near])
+    return int(_crossings(start[edge], way[edge], corner[pairs]).sum())
 
 
 def _crossings(start: Float64, way: Float64, corner: Float64) -> Bool:
-    """Return (E,) whether segments cross a triangle (3, 3), by Moeller and Trumbore."""
-    one, two = corner[1] - corner[0], corner[2] - corner[0]
+    """Return (N,) whether segments cross triangles (N, 3, 3), each its own, by Moeller and Trumbore."""
+    one, two = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     across = np.cross(way, two)
-    det = across @ one
+    det = (across * one).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        away = start - corner[0]
+        away = start - corner[:, 0]
         u = (away * across).sum(axis=1) / det
         turned = np.cross(away, one)
         v = (way * turned).sum(axis=1) / det
-        t = turned @ two / det
+        t = (turned * two).sum(axis=1) / det
         return np.asarray((u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1))
 
 
