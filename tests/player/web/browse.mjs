@@ -40,7 +40,10 @@ async function openFirefox() {
   const browser = await puppeteer.launch({ browser: "firefox", executablePath: path, headless: false, timeout: PATIENCE, protocolTimeout: PATIENCE });
   const page = await browser.newPage();
   page.setDefaultTimeout(PATIENCE);
-  await page.setViewport({ width: size[0], height: size[1] });
+  await page.setViewport({ width: size[0], height: size[1] }).catch((error) => {
+    // Firefox 140 has the size by then, but knows no orientation of screens.
+    if (!error.message.includes("setScreenOrientationOverride): unknown command")) throw error;
+  });
   return [browser, page];
 }
 

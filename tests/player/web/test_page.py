@@ -26,6 +26,7 @@ import fba
 from fba.animation import Animation, FaceTrack
 from fba.cli.main import group
 from fba.serving import Server, show_file, split_stream
+from fba_player import web
 from fba_player.export.page import PageStream, make_page
 from gltf_edits import edit
 from zoo_heads import MAKERS, original
@@ -215,6 +216,33 @@ def test_controls_by_mouse_and_keys(browse: Browse, head_page: str) -> None:
     assert "241" in results[25] or "frames" in results[25]
     assert (results[26], results[28], results[30]) == ("", "profile", "moved")
     assert results[32] is False
+
+
+LANES = """
+import { expressionsOf, visemesOf } from "./lanes.js";
+const rows = JSON.parse(process.argv.at(-1));
+const face = ([viseme, expression]) => ({ mask: [viseme !== null, expression !== null], viseme, expression });
+const frame = (at) => ({ face: face(rows[at]) });
+const frames = { length: rows.length, framesPerSecond: 10, indexOf: (at) => at, frame };
+console.log(JSON.stringify([visemesOf(frames), expressionsOf(frames)]));
+"""
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
+def test_what_was_sent_stays_in_force_in_the_lanes() -> None:
+    rows = [
+        ([10, 0, 63], [1, 63, 0, 0]), (None, None), ([1, 2, 10], [1, 0, 0, 0]), (None, None),
+        ([0, 0, 63], None),
+    ]  # fmt: skip
+    folder = Path(web.__file__).parent / "page"
+    command = ["node", "--input-type=module", "-e", LANES, json.dumps(rows)]
+    done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+    visemes, expressions = (
+        [(row["name"], row["from"], row["to"], row["share"]) for row in lane]
+        for lane in json.loads(done.stdout)
+    )
+    assert visemes == [("A:", 0, 0.2, 1), ("f v", 0.2, 0.4, 1)]
+    assert expressions == [("joy", 0, 0.2, 1)]
 
 
 def test_a_damaged_stream_says_so_and_shows_what_is_right(browse: Browse, hello: Animation) -> None:

@@ -71,20 +71,20 @@ export function liveliest(frames, count) {
   return moved.filter(({ share }) => share > 0).sort((a, b) => b.share - a.share).slice(0, count).map(({ parameter }) => parameter);
 }
 
-/** Return the visemes that are sent, one stretch for each. @param {Frames} frames @returns {Stretch[]} */
+/** Return the visemes in force: each until the next is sent. @param {Frames} frames @returns {Stretch[]} */
 export function visemesOf(frames) {
   return stretches(frames, ({ face }) => {
-    if (!face?.mask[0]) return null;
+    if (!face?.mask[0]) return undefined;
     const [first, second, blend] = face.viseme;
     const strongest = blend >= 32 || !second ? first : second;
     return strongest ? { name: VISEMES[strongest] ?? String(strongest), share: 1 } : null;
   });
 }
 
-/** Return the expressions that are sent. @param {Frames} frames @returns {Stretch[]} */
+/** Return the expressions in force. @param {Frames} frames @returns {Stretch[]} */
 export function expressionsOf(frames) {
   return stretches(frames, ({ face }) => {
-    if (!face?.mask[1]) return null;
+    if (!face?.mask[1]) return undefined;
     const [first, one, second, two] = face.expression;
     const [name, share] = one >= two ? [first, one] : [second, two];
     return name && share ? { name: EXPRESSIONS[name] ?? String(name), share: share / 63 } : null;
@@ -92,14 +92,17 @@ export function expressionsOf(frames) {
 }
 
 /**
- * @param {Frames} frames @param {(frame: import("./timeline.js").Frame) => {name: string, share: number} | null} read
+ * @param {Frames} frames @param {(frame: import("./timeline.js").Frame) => {name: string, share: number} | null | undefined} read undefined: nothing is sent
  * @returns {Stretch[]}
  */
 function stretches(frames, read) {
   /** @type {Stretch[]} */
   const found = [];
+  /** @type {{name: string, share: number} | null} */
+  let shown = null;
   for (let at = 0; at < frames.length; at += 1) {
-    const shown = read(frames.frame(at));
+    const sent = read(frames.frame(at));
+    if (sent !== undefined) shown = sent;
     if (!shown) continue;
     const from = frames.indexOf(at) / frames.framesPerSecond;
     const to = at + 1 < frames.length ? frames.indexOf(at + 1) / frames.framesPerSecond : from + 1 / frames.framesPerSecond;
