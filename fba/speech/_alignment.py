@@ -101,8 +101,7 @@ class _Listener:
     def __init__(self, words: Sequence[Pronounced], language: str) -> None:
         self.left = list(words)
         self._english = language.startswith("en")
-        from_model = _model_path("en-us/en-us-phone.lm.bin")
-        self._free = _decoder(allphone=from_model, lw=2.0, pip=0.3)
+        self._free = recogniser_of_phones()
         self._forced: Any = _decoder(lm=None, bestpath=False) if words else None
         self._names: dict[str, list[str]] = {}  # of the phones in IPA, by words that the model lacks
         self._stresses: dict[str, tuple[float, ...]] = {}  # of vowels, by words
@@ -135,7 +134,7 @@ class _Listener:
         )
         levels = measure_loudness(sound)
         return [
-            Phone(SILENCE, each.start, each.end) if _is_silent(levels, each) else each
+            Phone(SILENCE, each.start, each.end) if is_silent(levels, each) else each
             for each in _within(found, len(sound) / RATE)
         ]
 
@@ -203,7 +202,7 @@ class _Listener:
         return phones, words
 
 
-def _is_silent(levels: Float64, phone: Phone) -> bool:
+def is_silent(levels: Float64, phone: Phone) -> bool:
     """Whether a sound is too soft for what a recogniser hears in it. levels: dB, a hundred in a second."""
     part = levels[int(phone.start * 100) : int(phone.end * 100) + 1]
     return not len(part) or bool(part.max() < SILENT)
@@ -238,6 +237,11 @@ def _model_path(name: str) -> str:
             'Install it with: pip install "mpeg4-fba[speech]"; it has no wheels for Python 3.14 and later'
         ) from error
     return str(get_model_path(name))
+
+
+def recogniser_of_phones() -> Any:
+    """Return pocketsphinx' recogniser of phones without a text. Raises UnsupportedError without it."""
+    return _decoder(allphone=_model_path("en-us/en-us-phone.lm.bin"), lw=2.0, pip=0.3)
 
 
 def _decoder(**options: Any) -> Any:
