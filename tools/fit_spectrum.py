@@ -1,4 +1,4 @@
-"""Fits the weights by which the spectrum of a sound shows its visemes: `python tools/fit_spectrum.py [--write]`.
+"""Fits the weights by which a spectrum shows visemes: `python tools/fit_spectrum.py [--write]`.
 
 Voices of flite speak random words of the dictionary in pocketsphinx, as they are, in noise, and as over a
 telephone; flite says when each phone is. A linear discriminant with one covariance for all visemes separates
@@ -61,7 +61,9 @@ def spoken(voice: str, said: list[str]) -> Iterator[tuple[Int16, Int64]]:
     with tempfile.TemporaryDirectory(prefix="fba-") as folder:
         path = Path(folder) / "speech.wav"
         for text in said:
-            phones = [Phone(each.name, each.start + REST, each.end + REST) for each in speak(voice, text, path)]
+            phones = [
+                Phone(each.name, each.start + REST, each.end + REST) for each in speak(voice, text, path)
+            ]
             sound = np.concatenate([silence, *read_mono(path, RATE), silence])
             true = visemes(find_shapes(phones), len(sound) / RATE)
             yield sound, np.pad(true, (0, max(len(sound) // STEP - len(true), 0)))[: len(sound) // STEP]

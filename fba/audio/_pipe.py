@@ -20,7 +20,8 @@ MOST_CHANNELS = 64
 MOST_HEADER = 1 << 20
 """Bytes of chunks before the sound of a WAV."""
 LONGEST_PERIOD = 0.04
-"""Seconds that resampling may hold sound back; rates that need more count as the next multiple of `ROUND`."""
+"""Seconds of a period of both rates, of which resampling holds back two; rates with a longer one count as the
+next multiple of `ROUND`."""
 ROUND = 100
 _KINDS = {
     (1, 8): "u1", (1, 16): "<i2", (1, 24): "3u1", (1, 32): "<i4", (3, 32): "<f4", (3, 64): "<f8"
@@ -41,7 +42,9 @@ class Pipe(Protocol):
 
 
 def read_pipe(pipe: Pipe, rate: int, raw_rate: int | None = None) -> Iterator[Int16]:
-    """Yield samples int16 (N,) as they come, all channels mixed, up to 0.04 s late where they are resampled.
+    """Yield samples int16 (N,) as they come, all channels mixed.
+
+    Where they are resampled, they are 0.04 s late at most, from 11,025 Hz 0.08 s.
 
     rate: samples per second to yield. raw_rate: those of raw samples, signed 16 bits, lowest byte first, one
     channel; a WAV says its own, of 8 to 32 bits or floats. The length in its header does not count, since
@@ -84,7 +87,9 @@ def _as_int16(samples: np.ndarray) -> Int16:
     if samples.ndim == 2:  # 24 bits: the upper two bytes
         return np.asarray(samples[:, 1:].copy().view("<i2")[:, 0])
     if samples.dtype.kind == "f":
-        return np.asarray(np.clip(np.nan_to_num(samples) * 32768.0, -32768, 32767), dtype=np.int16)
+        return np.asarray(
+            np.clip(np.nan_to_num(samples).clip(-1, 1) * 32768.0, -32768, 32767), dtype=np.int16
+        )
     if samples.dtype == np.uint8:
         return np.asarray((samples.astype(np.int16) - 128) * 256, dtype=np.int16)
     return np.asarray(samples >> 16 if samples.dtype.itemsize == 4 else samples, dtype=np.int16)
@@ -128,7 +133,10 @@ def _not_wave(head: bytes) -> str:
         return "the sound is empty: nothing came"
     kind = next((name for begin, name in _OTHERS.items() if head.startswith(begin)), None)
     if kind is None:
-        return f"the sound has no header of a WAV, it begins with {head[:4]!r}: raw samples need their rate"
+        return (
+            f"the sound has no header of a WAV: it begins with {head[:4]!r}. Of raw samples, say the rate: "
+            "`fba speak --audio - --pcm 16000`"
+        )
     return f"the sound is {kind}, and only WAV and raw samples are heard while they come: {_REMEDY}"
 
 

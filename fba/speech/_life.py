@@ -141,7 +141,8 @@ class LiveLife:
             self._blink = _next_blink(self._blink, self._number)
         loud = float(np.clip((self._levels - self._usual) / LOUD_RANGE + 0.5, 0, 1).mean())
         sizes = {"nod": self._amount * loud, "brows": self._amount * max(2 * loud - 1, 0.0)}
-        sizes["blink"] = float(np.interp(now - self._blink, *zip(*_SHAPES["blink"], strict=True)))
+        offsets, shares = zip(*_SHAPES["blink"], strict=True)
+        sizes["blink"] = float(np.interp(now - self._blink, offsets, shares))
         values, mask = face.values.copy(), face.mask.copy()
         for part, size in sizes.items():
             for name, most in _PARTS[part].items():

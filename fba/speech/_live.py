@@ -21,7 +21,6 @@ from fba.speech._performance import check_share, with_outer_lips
 from fba.speech._pieces import RATE, STEP, measure_loudness
 from fba.speech._sounds import SILENCE, Phone, find_shapes
 from fba.speech._spectrum import Spectrum
-from fba.tracks import FaceTrack
 
 PIECE = 2 * STEP
 """Samples that are heard at once."""
@@ -57,9 +56,9 @@ SHORT_CLOSURE = 0.04
 class LiveSpeech:
     """A face that speaks as its sound comes; a frame is made from the sound until 0.26 s behind it.
 
-    rate: frames in a second, from 10 on. style, life: as of `perform`. recogniser: pocketsphinx finds the phones
-    of English; without it, or where it is None and pocketsphinx is not installed, loudness and spectrum move
-    jaw and lips, more roughly. seconds: of sound so far.
+    rate: frames in a second, from 10 on. style, life: as of `perform`. recogniser: whether pocketsphinx finds
+    phones of English; if not, loudness and spectrum move jaw and lips, more roughly. None: if it is
+    installed. recognises: whether it is used. seconds: of sound so far.
 
     Raises OptionError for numbers out of range, UnsupportedError for a recogniser that is not installed.
     """
@@ -149,7 +148,9 @@ class _Rough:
     def phones(self, since: float) -> list[Phone]:
         """Return the sounds from a second on, as far as they are known."""
         found: list[Phone] = []
-        for name, group in groupby((each for each in self._judged if each.end > since), lambda each: each.name):
+        for name, group in groupby(
+            (each for each in self._judged if each.end > since), lambda each: each.name
+        ):
             parts = list(group)
             start, end = parts[0].start, parts[-1].end
             if name in ("P", "F") and end - start < SHORT_CLOSURE and found:

@@ -63,7 +63,7 @@ def _bank() -> Float64:
 
 
 def measure_bands(sound: Int16) -> Float64:
-    """Return levels in bands (N, bands), dB, of all windows of a sound, each a hundredth of a second later."""
+    """Return levels in bands (N, bands), dB, of all windows of a sound, a hundredth of a second apart."""
     if len(sound) < WINDOW:
         return np.zeros((0, BANDS))
     windows = np.lib.stride_tricks.sliding_window_view(sound.astype(np.float64), WINDOW)[::STEP]
@@ -117,7 +117,9 @@ class Spectrum:
         first, self._judged = self._judged, self._judged + count
         return [
             Phone(PHONES[viseme], at / 100, (at + 1) / 100, size)
-            for at, viseme, size in zip(range(first, self._judged), visemes.tolist(), sizes.tolist(), strict=True)
+            for at, viseme, size in zip(
+                range(first, self._judged), visemes.tolist(), sizes.tolist(), strict=True
+            )
         ]
 
     def _learn(self, levels: Float64) -> None:

@@ -16,7 +16,7 @@ from fba.arrays import Int16
 from fba.audio import read_mono
 from fba.errors import OptionError, UnsupportedError
 from fba.parameters import fap_numbers
-from fba.speech import RATE, LiveSpeech, Phone, find_shapes
+from fba.speech import RATE, LiveSpeech, find_shapes
 from tests.speech.test_alignment import needs_flite
 
 DELAY = 0.26
@@ -31,7 +31,10 @@ SOURCES = [
     ),
     pytest.param(False, id="spectrum"),
 ]
-JAW, LIPS = fap_numbers()["open_jaw"] - 1, [fap_numbers()[f"{name}_midlip"] - 1 for name in ("lower_t", "raise_b")]
+JAW, LIPS = (
+    fap_numbers()["open_jaw"] - 1,
+    [fap_numbers()[f"{name}_midlip"] - 1 for name in ("lower_t", "raise_b")],
+)
 
 
 def babble(seconds: float = 3.0) -> Int16:
@@ -111,14 +114,14 @@ def test_the_mouth_makes_what_is_said(recogniser: bool, right: float, tmp_path) 
     for text in SENTENCES[:4]:
         truth = speak("rms", text, tmp_path / "speech.wav")
         sound = np.concatenate(list(read_mono(tmp_path / "speech.wav", RATE)))
-        begun, shown = live.seconds, []
-        frames = said(live, sound, 320)
-        for frame in frames:
-            now = float(frame.index[0] / frame.rate)
-            found = [each for each in find_shapes(live._source.phones(now - 0.1)) if each.start <= now < each.end]
-            shown.append((now - begun, found[0].viseme if found else 0))
-        true = visemes(find_shapes(truth), len(sound) / RATE)
-        shares += [true[int(100 * at)] == viseme for at, viseme in shown if 0 <= at < len(sound) / RATE]
+        true, begun, frames = visemes(find_shapes(truth), len(sound) / RATE), live.seconds, []
+        for at in range(0, len(sound), 320):
+            for frame in live.push(sound[at : at + 320]):
+                frames.append(frame)
+                now = float(frame.index[0] / frame.rate)
+                heard = find_shapes(live._source.phones(now - 0.1))
+                shown = next((each.viseme for each in heard if each.start <= now < each.end), 0)
+                shares += [true[round(100 * (now - begun))] == shown] if now >= begun else []
         moved = values(frames)
         assert np.abs(moved[:, JAW]).max() > 100
         assert (moved[:, LIPS].sum(axis=1) >= 0).any(), "lips never meet"
@@ -130,15 +133,15 @@ def test_the_mouth_makes_what_is_said(recogniser: bool, right: float, tmp_path) 
 def test_minutes_need_no_more_memory(recogniser: bool) -> None:
     live, sizes = LiveSpeech(recogniser=recogniser), []
     for _ in range(8):
-        for _ in live.push(babble(15.0)):
-            sizes.append(len(live._source.phones(0.0)))
+        sizes += [len(live._source.phones(0.0)) for _ in live.push(babble(15.0))]
     assert len(sizes) == pytest.approx(8 * 15 * 25, abs=10)
     assert max(sizes[-1000:]) < 200
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"), [({"style": 1.5}, "style must be"), ({"life": -1}, "life must be"), ({"rate": Fraction(5)}, "10 frames")]
-)  # fmt: skip
+    ("wrong", "said"),
+    [({"style": 1.5}, "style must"), ({"life": -1}, "life must"), ({"rate": Fraction(5)}, "10 frames")],
+)
 def test_numbers_out_of_range_are_refused(wrong: dict[str, float], said: str) -> None:
     with pytest.raises(OptionError, match=said):
         LiveSpeech(**wrong)  # type: ignore[arg-type]

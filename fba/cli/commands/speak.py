@@ -84,8 +84,11 @@ class _Said:
 
         if self.pcm is not None and not self.is_live:
             raise click.UsageError("--pcm goes with --audio -: the samples that come on standard input")
-        for flag in [*texts, *(["--timings"] if self.timings is not None else [])] if self.is_live else ():
-            raise click.UsageError(f"--audio - is spoken while it comes, and {flag} needs all of it: give a file")
+        flag = texts[0] if texts else "--timings" if self.timings is not None else ""
+        if self.is_live and flag:
+            raise click.UsageError(
+                f"--audio - is spoken while it comes, and {flag} needs all of it: give a file"
+            )
 
     @property
     def is_live(self) -> bool:
