@@ -118,15 +118,18 @@ def main() -> None:
             for change in CHANGES:
                 found[voice].append(rows(change(sound), true))
 
+    tail = np.zeros(RATE // 4, dtype=np.int16)
     for voice in VOICES:
         table = learn([part for other in VOICES if other != voice for part in found[other]])
         shares = []
         for change in CHANGES:
-            right = []
-            for sound, true in spoken(voice, list(SENTENCES)):
-                judged = Spectrum(table).push(np.concatenate([change(sound), np.zeros(RATE // 4, np.int16)]))
-                right.append(visemes(find_shapes(judged), len(true) / 100)[: len(true)] == true)
-            shares.append(np.concatenate(right).mean())
+            sounds, visemes_said = zip(*spoken(voice, list(SENTENCES)), strict=True)
+            spectrum, true = Spectrum(table), np.concatenate(visemes_said)
+            whole = np.concatenate([*(change(sound[: len(sound) // STEP * STEP]) for sound in sounds), tail])
+            judged = [
+                each for at in range(0, len(whole), STEP) for each in spectrum.push(whole[at : at + STEP])
+            ]
+            shares.append((visemes(find_shapes(judged), len(true) / 100)[: len(true)] == true).mean())
         print(voice, *(f"{share:.1%}" for share in shares))
     if arguments.write:
         write(learn([part for parts in found.values() for part in parts]))

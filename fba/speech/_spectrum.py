@@ -54,7 +54,7 @@ def read_weights() -> Weights:
 @cache
 def _bank() -> Float64:
     """Return the weights (bins, bands) of triangular bands."""
-    mel = np.linspace(*(np.log1p(hertz / 700) for hertz in (LOWEST, HIGHEST)), BANDS + 2)
+    mel = np.linspace(np.log1p(LOWEST / 700), np.log1p(HIGHEST / 700), BANDS + 2)
     edges = 700 * np.expm1(mel) * WINDOW / RATE
     low, middle, high = edges[:-2], edges[1:-1], edges[2:]
     bins = np.arange(WINDOW // 2 + 1)[:, None]

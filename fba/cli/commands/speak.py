@@ -25,6 +25,8 @@ SHARE = click.FloatRange(0, 1)
 MOST_TEXT_BYTES = 1 << 24
 WELL_HEARD = 0.8
 """Nothing is said of missing words where at least this share of a text's words is heard."""
+MOST_NAMED = 5
+"""Spans that are named of those in which more is spoken than a text says."""
 CLIPPED = 0.001
 """A recording with at least this share of its samples at full scale counts as clipped."""
 
@@ -316,6 +318,9 @@ def _warn(sound: Path, spoken: Speech, prosody: Prosody) -> None:
     if spoken.found is not None and spoken.found < WELL_HEARD:
         missed = ", ".join(f"{word.text!r} at {word.start:.1f} s" for word in spoken.missed)
         warn(f"{sound}: {spoken.found:.0%} of the text's words are heard; missing are {missed}")
+    if spoken.extra:
+        where = ", ".join(f"from {start:.1f} to {end:.1f} s" for start, end in spoken.extra[:MOST_NAMED])
+        warn(f"{sound}: more is spoken than the text says, {where}; the mouth follows the sound there")
 
 
 def _figures(spoken: Speech, animation: Animation, data: bytes) -> dict[str, Any]:
