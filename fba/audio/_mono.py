@@ -31,10 +31,11 @@ def read_mono(path: PathLike, rate: int) -> Iterator[Int16]:
         block, start = round(BLOCK_SECONDS * rate), 0
         while len(samples := sound.read(start, block)):
             start += len(samples)
-            yield samples[:, 0].copy() if sound.mono else _mix(samples)
+            yield samples[:, 0].copy() if sound.mono else mix(samples)
 
 
-def _mix(samples: Int16) -> Int16:
+def mix(samples: Int16) -> Int16:
+    """Return the mean (N,) of the channels of samples (N, channels)."""
     return np.asarray(samples.astype(np.int32).mean(axis=1).round(), dtype=np.int16)
 
 
@@ -49,7 +50,7 @@ def _read_wave(path: PathLike, rate: int) -> Iterator[Int16]:
             resampler = Resampler(own, rate)
             while data := file.readframes(own):
                 samples = np.frombuffer(data[: len(data) // (2 * channels) * 2 * channels], dtype="<i2")
-                yield resampler(_mix(samples.reshape(-1, channels)))
+                yield resampler(mix(samples.reshape(-1, channels)))
             yield resampler(np.zeros(0, dtype=np.int16), last=True)
     except (wave.Error, EOFError) as error:
         raise DisplayError(f"{path}: {error or 'is cut off'}; {needed}") from error
@@ -58,13 +59,14 @@ def _read_wave(path: PathLike, rate: int) -> Iterator[Int16]:
 class Resampler:
     """Converts samples from one rate to another, block by block, as if they were converted at once.
 
-    source, target: samples per second. It holds back a tenth of a second, whose filter needs what follows.
+    source, target: samples per second. It holds back a hundredth of a second, or a period of both
+    rates where that is longer, since its filter needs what follows.
     """
 
     def __init__(self, source: int, target: int) -> None:
         common = gcd(source, target)
         self._up, self._down = target // common, source // common
-        self._margin = -(-source // 10 // self._down) * self._down  # whole periods
+        self._margin = -(-source // 100 // self._down) * self._down  # whole periods
         self._held: Float32 = np.zeros(0, dtype=np.float32)
         self._done = 0  # samples of those held that were converted
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import ExitStack
 from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -186,9 +187,13 @@ def piped_planes(reading: Reading) -> tuple[Callable[[int], bytes], PlaneSplitte
     """Return what reads standard input, and what splits the stream in it into planes."""
     from fba.serving import PlaneSplitter
 
-    if sys.stdin.isatty():
-        raise click.UsageError("- reads standard input, which is the keyboard here: pipe a stream into it")
     table = None if reading.bap_steps == BAP_STEPS_AUTO else reading.bap_steps
+    return open_pipe("a stream").read, PlaneSplitter(table, reading.limit)
+
+
+def open_pipe(what: str) -> FileIO:
+    """Return standard input, unbuffered. what: is expected there. Raises click.UsageError for a keyboard."""
+    if sys.stdin.isatty():
+        raise click.UsageError(f"- reads standard input, which is the keyboard here: pipe {what} into it")
     # Unbuffered: a thread that waits in a buffer's lock would hold up the end of the program.
-    piped = open(sys.stdin.fileno(), "rb", buffering=0, closefd=False)  # noqa: SIM115 - open for as long as the program runs
-    return piped.read, PlaneSplitter(table, reading.limit)
+    return FileIO(sys.stdin.fileno(), closefd=False)

@@ -5,6 +5,7 @@ programs, and `perform` lets a face speak them.
 """
 
 from fba.speech._alignment import find_speech
+from fba.speech._live import LiveSpeech
 from fba.speech._performance import Coding, encoder_options, perform
 from fba.speech._pieces import RATE
 from fba.speech._prosody import Prosody
@@ -18,6 +19,7 @@ from fba.speech._voices import speak_text
 __all__ = [
     "RATE",
     "Coding",
+    "LiveSpeech",
     "Phone",
     "Prosody",
     "Shape",

@@ -28,6 +28,8 @@ HEARD = 0.45
 """Share of frames whose viseme must be recognised without the text, too, for a word to count as heard."""
 FITS = 0.3
 """Share of words that must be heard for a text to be the one that is spoken, unless there is noise."""
+GAP = 0.6
+"""Least length of a gap in a text, seconds, in which more may be spoken than it says."""
 SILENT = -60.0
 """dB below full scale under which nothing is spoken."""
 CLEAR = 20.0
@@ -54,6 +56,7 @@ def find_speech(
     phones: list[Phone] = []
     heard: list[Word] = []
     missed: list[Word] = []
+    extra: list[tuple[float, float]] = []
     end = 0.0
     levels: list[Float64] = []
     aligned_once = False
@@ -66,9 +69,11 @@ def find_speech(
         if words is None:
             phones += _later(free, start)
         else:
-            aligned, spoken = listener.align(sound, last, begins=start == 0)
+            aligned, spoken = listener.align(sound, last)
             aligned_once |= bool(aligned)
-            phones += _later(aligned or free, start)
+            filled, gaps = _fill(aligned or [Phone(SILENCE, 0.0, end - start)], free)
+            phones += _later(filled if aligned else free, start)
+            extra += [(max(begin, 0.0) + start, min(stop + start, end)) for begin, stop in gaps]
             for word, share in _compare(spoken, aligned, free):
                 (heard if share >= HEARD else missed).append(
                     Word(word.text, word.start + start, word.end + start)
@@ -78,21 +83,46 @@ def find_speech(
         raise FormatError("the sound is empty: it has no samples")
     if words is None:
         return Speech(tuple(_within(phones, end)), (), end)
+    missed += [Word(word.text, end, end) for word in listener.left]
     share = len(heard) / len(words)
     spoken_words = tuple(sorted([*heard, *missed], key=lambda word: word.start))
     quiet, loud = np.percentile(np.concatenate(levels), (10, 95)) if any(map(len, levels)) else (0.0, 0.0)
     if not aligned_once or (share < FITS and loud - quiet > CLEAR):
-        raise FormatError(_unfit(share, len(words), missed, listener.left))
-    return Speech(tuple(_within(phones, end)), spoken_words, end, share, tuple(missed[:MISSED_NAMED]))
-
-
-def _unfit(share: float, count: int, missed: Sequence[Word], left: Sequence[Pronounced]) -> str:
-    where = [f"{word.text!r} at {word.start:.1f} s" for word in missed[:MISSED_NAMED]]
-    where += [f"{left[0].text!r} and what follows it"] if left else []
-    return (
-        f"the text does not fit the sound: {share:.0%} of its {count} words are heard"
-        f"{'; missing are ' if where else ''}{', '.join(where)}; give the words that are spoken, or no text"
+        raise FormatError(_unfit(share, len(words), missed))
+    return Speech(
+        tuple(_within(phones, end)), spoken_words, end, share, tuple(missed[:MISSED_NAMED]), tuple(extra)
     )
+
+
+def _unfit(share: float, count: int, missed: Sequence[Word]) -> str:
+    where = ", ".join(f"{word.text!r} at {word.start:.1f} s" for word in missed[:MISSED_NAMED])
+    return (
+        f"the text does not fit the sound: {share:.0%} of its {count} words are heard; missing are "
+        f"{where}{' and more' * (len(missed) > MISSED_NAMED)}; give the words that are spoken, or no text"
+    )
+
+
+def _fill(aligned: Sequence[Phone], free: Sequence[Phone]) -> tuple[list[Phone], list[tuple[float, float]]]:
+    """Return phones of a text, with those that are heard without it where it leaves a long gap, and the gaps.
+
+    A gap without a sound stays as it is.
+    """
+    filled: list[Phone] = []
+    gaps: list[tuple[float, float]] = []
+    for phone in aligned:
+        within = [
+            Phone(each.name, max(each.start, phone.start), min(each.end, phone.end))
+            for each in free
+            if each.start < phone.end and each.end > phone.start
+        ]
+        voiced = sum(each.end - each.start for each in within if find_sound(each.name) != find_sound(SILENCE))
+        length = phone.end - phone.start
+        if find_sound(phone.name) == find_sound(SILENCE) and length >= GAP and voiced > length / 2:
+            filled += within
+            gaps.append((phone.start, phone.end))
+        else:
+            filled.append(phone)
+    return filled, gaps
 
 
 class _Listener:
@@ -101,8 +131,7 @@ class _Listener:
     def __init__(self, words: Sequence[Pronounced], language: str) -> None:
         self.left = list(words)
         self._english = language.startswith("en")
-        from_model = _model_path("en-us/en-us-phone.lm.bin")
-        self._free = _decoder(allphone=from_model, lw=2.0, pip=0.3)
+        self._free = recogniser_of_phones()
         self._forced: Any = _decoder(lm=None, bestpath=False) if words else None
         self._names: dict[str, list[str]] = {}  # of the phones in IPA, by words that the model lacks
         self._stresses: dict[str, tuple[float, ...]] = {}  # of vowels, by words
@@ -135,22 +164,22 @@ class _Listener:
         )
         levels = measure_loudness(sound)
         return [
-            Phone(SILENCE, each.start, each.end) if _is_silent(levels, each) else each
+            Phone(SILENCE, each.start, each.end) if is_silent(levels, each) else each
             for each in _within(found, len(sound) / RATE)
         ]
 
-    def align(self, sound: Int16, last: bool, *, begins: bool) -> tuple[list[Phone], list[Word]]:
+    def align(self, sound: Int16, last: bool) -> tuple[list[Phone], list[Word]]:
         """Return the phones and words of the next part of the text in a sound, as far as it is spoken there.
 
-        last, begins: whether it is the last, and the first, of the sound's pieces.
+        last: whether it is the last of the sound's pieces, in which all that is left should be spoken.
         """
-        seconds = len(sound) / RATE
-        most = int(seconds * MOST_WORDS) + 4
-        take = len(self.left)
-        if not (last and take <= most):
-            take = self._count_spoken(sound, self.left[:most])
-        elif last and begins and not self.left:
-            take = 0
+        most = int(len(sound) / RATE * MOST_WORDS) + 4
+        if last and 0 < len(self.left) <= most:
+            phones, words = self._force(sound, self.left)
+            if phones:
+                self.left = []
+                return phones, words
+        take = self._count_spoken(sound, self.left[:most])
         spoken, self.left = self.left[:take], self.left[take:]
         return self._force(sound, spoken) if spoken else ([], [])
 
@@ -203,7 +232,7 @@ class _Listener:
         return phones, words
 
 
-def _is_silent(levels: Float64, phone: Phone) -> bool:
+def is_silent(levels: Float64, phone: Phone) -> bool:
     """Whether a sound is too soft for what a recogniser hears in it. levels: dB, a hundred in a second."""
     part = levels[int(phone.start * 100) : int(phone.end * 100) + 1]
     return not len(part) or bool(part.max() < SILENT)
@@ -238,6 +267,11 @@ def _model_path(name: str) -> str:
             'Install it with: pip install "mpeg4-fba[speech]"; it has no wheels for Python 3.14 and later'
         ) from error
     return str(get_model_path(name))
+
+
+def recogniser_of_phones() -> Any:
+    """Return pocketsphinx' recogniser of phones without a text. Raises UnsupportedError without it."""
+    return _decoder(allphone=_model_path("en-us/en-us-phone.lm.bin"), lw=2.0, pip=0.3)
 
 
 def _decoder(**options: Any) -> Any:

@@ -16,6 +16,7 @@ from fba.arrays import Float64, Int64
 from fba.parameters import FAP_COUNT, fap_numbers
 from fba.speech._prosody import Prosody
 from fba.speech._sounds import SILENCE, Phone, Speech, find_sound
+from fba.tracks import FaceTrack
 
 NOD, TURN = 5200.0, 2600.0
 """Of the head, in 1e-5 rad: 3 degrees down at a syllable that stands out, 1.5 to a side between phrases."""
@@ -31,6 +32,13 @@ BLINK_PERIOD = 3.6
 """Seconds after which eyes blink without a pause."""
 PAUSE = 0.18
 """Least length of a pause, seconds."""
+
+QUIETEST, USUAL_LEVEL = -96.0, -25.0
+"""dB below full scale, of silence and of speech before any was heard."""
+LOUD_RANGE = 12.0
+"""dB around the usual loudness within which the head follows it."""
+LOUD_BEFORE = 48
+"""Hundredths of a second whose loudness counts."""
 
 _PARTS = {
     "nod": {"head_pitch": NOD},
@@ -105,6 +113,50 @@ def find_life(speech: Speech, rate: Fraction, amount: float, prosody: Prosody | 
     return Life({part: _simplify(each) for part, each in keys.items() if len(each) > 1})
 
 
+class LiveLife:
+    """The same while speech comes: the head and the brows go with the loudness, eyes blink as ever.
+
+    rate: frames in a second. amount: as of `find_life`.
+    """
+
+    def __init__(self, rate: Fraction, amount: float) -> None:
+        self._rate, self._amount = rate, amount
+        self._levels = np.full(LOUD_BEFORE, QUIETEST)
+        self._usual = USUAL_LEVEL
+        self._number, self._blink = 0, _next_blink(0.0, 1)
+
+    def push(self, levels: Float64) -> None:
+        """Hear levels (N,), dB, of hundredths of a second."""
+        self._levels = np.concatenate([self._levels, levels])[-LOUD_BEFORE:]
+        loud = levels[levels > self._usual - LOUD_RANGE]
+        self._usual += 0.003 * float((loud - self._usual).sum())
+
+    def add(self, face: FaceTrack, frame: int) -> FaceTrack:
+        """Return a face (1 frame) that lives."""
+        if not self._amount:
+            return face
+        now = float(frame / self._rate)
+        if now > self._blink + _SHAPES["blink"][-1][0]:
+            self._number += 1
+            self._blink = _next_blink(self._blink, self._number)
+        loud = float(np.clip((self._levels - self._usual) / LOUD_RANGE + 0.5, 0, 1).mean())
+        sizes = {"nod": self._amount * loud, "brows": self._amount * max(2 * loud - 1, 0.0)}
+        offsets, shares = zip(*_SHAPES["blink"], strict=True)
+        sizes["blink"] = float(np.interp(now - self._blink, offsets, shares))
+        values, mask = face.values.copy(), face.mask.copy()
+        for part, size in sizes.items():
+            for name, most in _PARTS[part].items():
+                column = fap_numbers()[name] - 1
+                values[:, column] += round(size * most)
+                mask[:, column] = True
+        return FaceTrack(values, mask)
+
+
+def _next_blink(last: float, number: int) -> float:
+    """Return when eyes blink again without a pause: not like a clock."""
+    return last + BLINK_PERIOD * (0.8 + 0.1 * (number * 7 % 5))
+
+
 def _add(keys: list[tuple[int, float]], part: str, moment: float, size: float, rate: Fraction) -> None:
     """Add a movement, unless the one before it is still going on."""
     frames = [round((moment + offset) * rate) for offset, _ in _SHAPES[part]]
@@ -138,7 +190,7 @@ def _blinks(speech: Speech) -> Iterator[float]:
         number = 0
         while pause.start - last > 1.6 * BLINK_PERIOD:
             number += 1
-            last += BLINK_PERIOD * (0.8 + 0.1 * (number * 7 % 5))  # not like a clock
+            last = _next_blink(last, number)
             yield last
         if pause.start - last > 0.4 * BLINK_PERIOD and pause.end > pause.start:
             last = pause.start + 0.1

@@ -47,9 +47,8 @@ def perform(
 
     Raises OptionError for numbers outside of 0 to 1.
     """
-    for name, value in (("style", style), ("life", life)):
-        if not 0 <= value <= 1:
-            raise OptionError(f"{name} must be from 0 to 1, not {value:g}")
+    check_share("style", style)
+    check_share("life", life)
     shapes = find_shapes(speech.phones)
     motion = find_life(speech, rate, life, prosody)
     keys = find_keys(shapes, rate)
@@ -63,6 +62,12 @@ def perform(
     index = np.array(sorted(frames), dtype=np.int64)
     face = _as_visemes(keys, index, style) if coding == "visemes" else _as_faps(shapes, index, rate, style)
     return Animation(face=_with_life(face, motion, index), body=None, rate=rate, index=index)
+
+
+def check_share(name: str, value: float) -> None:
+    """Raise OptionError for a number outside of 0 to 1."""
+    if not 0 <= value <= 1:
+        raise OptionError(f"{name} must be from 0 to 1, not {value:g}")
 
 
 def encoder_options(coding: Coding) -> EncoderOptions:
@@ -89,7 +94,7 @@ def _as_visemes(keys: Sequence[tuple[int, Shape]], index: Int64, style: float) -
 
 
 def _as_faps(shapes: Sequence[Shape], index: Int64, rate: Fraction, style: float) -> FaceTrack:
-    """Return low-level FAPs in frames. The outer contour of the lips follows the inner one, which is sent."""
+    """Return low-level FAPs in frames."""
     values = np.zeros((len(index), FAP_COUNT), dtype=np.int32)
     mask = np.zeros((len(index), FAP_COUNT), dtype=bool)
     reach, begin = round(REACH * rate) + 1, 0
@@ -107,6 +112,12 @@ def _as_faps(shapes: Sequence[Shape], index: Int64, rate: Fraction, style: float
         ]
         track = coarticulate(moved, rate, first + AT_ONCE - start, style=find_style(style))
         values[rows], mask[rows] = track.values[index[rows] - start], track.mask[index[rows] - start]
+    return with_outer_lips(FaceTrack(values, mask))
+
+
+def with_outer_lips(face: FaceTrack) -> FaceTrack:
+    """Return a face whose outer contour of the lips follows the inner one, which is sent."""
+    values, mask = face.values.copy(), face.mask.copy()
     inner, outer = (slice(begin - 1, begin + 9) for begin in (_INNER, _OUTER))
     values[:, outer], mask[:, outer] = values[:, inner], mask[:, inner]
     return FaceTrack(values, mask)

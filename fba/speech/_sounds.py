@@ -43,7 +43,7 @@ class Speech:
     """What is spoken: phones and words with their times. seconds: length of the sound.
 
     found: share of the words of the text that are heard in the sound; None without a text. missed: words that
-    are not heard, the first ones.
+    are not heard, the first ones. extra: spans, in seconds, in which something else is spoken than the text.
     """
 
     phones: tuple[Phone, ...]
@@ -51,6 +51,7 @@ class Speech:
     seconds: float
     found: float | None = None
     missed: tuple[Word, ...] = ()
+    extra: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,6 +74,28 @@ def test_a_text_that_does_not_fit_is_refused_with_the_words_that_are_missing(tmp
 
 @needs_recogniser
 @needs_flite
+def test_a_text_that_is_longer_or_shorter_than_the_sound_says_where(tmp_path: Path) -> None:
+    sound, truth = spoken("rms", SENTENCES[0], tmp_path)
+    more, _ = spoken("rms", SENTENCES[4], tmp_path)
+    words = split_text(SENTENCES[0])
+    longer = find_speech([sound], [*words, *split_text(SENTENCES[4])])
+    assert longer.found is not None
+    assert 0.25 < longer.found < 0.6
+    assert [word.text for word in longer.words][-10:] == [word.text for word in split_text(SENTENCES[4])]
+    assert longer.words[-1].start == longer.seconds
+    shorter = find_speech([np.concatenate([sound, more])], words)
+    assert shorter.found is not None
+    assert shorter.found > 0.7
+    ((start, end),) = shorter.extra
+    assert truth[-1].end - 0.5 < start < truth[-1].end + 0.3
+    assert end == pytest.approx(shorter.seconds, abs=0.3)
+    after = [shape.viseme for shape in find_shapes(shorter.phones) if shape.start > start]
+    assert 7 in after, "the mouth follows the sound"
+    assert not find_speech([sound], words).extra
+
+
+@needs_recogniser
+@needs_flite
 def test_long_sounds_are_aligned_in_pieces(tmp_path: Path) -> None:
     sounds, phones, at = [], [], 0.0
     for text in SENTENCES:

@@ -25,6 +25,8 @@ SHARE = click.FloatRange(0, 1)
 MOST_TEXT_BYTES = 1 << 24
 WELL_HEARD = 0.8
 """Nothing is said of missing words where at least this share of a text's words is heard."""
+MOST_NAMED = 5
+"""Spans that are named of those in which more is spoken than a text says."""
 CLIPPED = 0.001
 """A recording with at least this share of its samples at full scale counts as clipped."""
 
@@ -34,7 +36,16 @@ class _Said:
     """What is spoken."""
 
     audio: Path | None = option(
-        type=options.FILE, metavar="FILE", help="Recording of the speech: anything that FFmpeg reads."
+        type=options.EXISTING,
+        metavar="FILE",
+        help="Recording of the speech: anything that FFmpeg reads. -: what comes on standard input, a WAV or "
+        "raw samples, is spoken while it comes, 0.3 s late.",
+    )
+    pcm: int | None = option(
+        type=click.IntRange(1000, 200_000),
+        metavar="HZ",
+        help="With --audio -: samples a second of raw sound, signed 16 bits, lowest byte first, one channel. "
+        "A WAV says its own.",
     )
     text: str | None = option(metavar="TEXT", help="What is spoken. Without --audio, a voice speaks it.")
     text_file: Path | None = option(type=options.FILE, metavar="FILE", help="The same from a file, in UTF-8.")
@@ -72,6 +83,19 @@ class _Said:
             raise click.UsageError(
                 "--voice speaks a text that has no recording; leave --audio and --timings out"
             )
+
+        if self.pcm is not None and not self.is_live:
+            raise click.UsageError("--pcm goes with --audio -: the samples that come on standard input")
+        flag = texts[0] if texts else "--timings" if self.timings is not None else ""
+        if self.is_live and flag:
+            raise click.UsageError(
+                f"--audio - is spoken while it comes, and {flag} needs all of it: give a file"
+            )
+
+    @property
+    def is_live(self) -> bool:
+        """Whether the sound comes on standard input."""
+        return self.audio == STANDARD
 
     @property
     def needs_voice(self) -> bool:
@@ -111,6 +135,7 @@ class _Manner:
         'fba speak --audio talk.wav --text "What is said in it" -o talk.fba',
         "fba speak --audio talk.wav -o talk.fba    # without a text: rougher",
         "fba speak --timings cues.json --coding visemes -o talk.fba",
+        "arecord -f S16_LE -r 16000 | fba speak --audio - -o - | fba play -",
     ),
 )
 @with_options
@@ -128,6 +153,9 @@ def command(
     """
     said.check()
     moods = _moods(manner)
+    if said.is_live:
+        _speak_live(said, manner, moods, output, no_clobber=no_clobber, as_json=as_json)
+        return
     if said.needs_voice and output == STANDARD:
         raise click.UsageError("a voice writes its sound beside the stream; give the stream a name with -o")
     sound = output.with_suffix(".wav") if said.needs_voice else said.audio
@@ -153,9 +181,40 @@ def command(
     if as_json:
         outputs.print_json(figures)
         return
-    outputs.say(_summary(output, spoken, animation, data))
+    text = _summary(output, spoken.seconds, len(animation), animation.rate, len(data))
+    skipped = int(animation.index[-1]) + 1 - len(animation)
+    if skipped:
+        text += f"; {skipped} frames between them are skipped, over which players move evenly"
+    if spoken.found is not None:
+        text += f"; {spoken.found:.0%} of {len(spoken.words)} words heard"
+    outputs.say(text)
     if voice:
         outputs.say(f"{sound}: spoken by {voice}")
+
+
+def _speak_live(
+    said: _Said, manner: _Manner, moods: list[Any], output: Path, *, no_clobber: bool, as_json: bool
+) -> None:
+    """Write a face that speaks what comes on standard input."""
+    if manner.coding == "visemes":
+        raise click.UsageError("--audio - sends low-level FAPs; leave --coding visemes out")
+    outputs = Outputs([Output("--output", output)], [STANDARD], no_clobber=no_clobber)
+    from fba.cli.live_speech import speak_live
+
+    speech, recorder = speak_live(
+        output, raw_rate=said.pcm, rate=manner.rate, style=manner.style, life=manner.life, moods=moods
+    )
+    if as_json:
+        outputs.print_json(
+            {
+                "seconds": round(speech.seconds, 3),
+                "frames": recorder.frames,
+                "size": recorder.size,
+                "bits_per_second": round(8 * recorder.size / speech.seconds, 1),
+            }
+        )
+        return
+    outputs.say(_summary(output, speech.seconds, recorder.frames, recorder.rate, recorder.size))
 
 
 def _moods(manner: _Manner) -> list[Any]:
@@ -259,6 +318,9 @@ def _warn(sound: Path, spoken: Speech, prosody: Prosody) -> None:
     if spoken.found is not None and spoken.found < WELL_HEARD:
         missed = ", ".join(f"{word.text!r} at {word.start:.1f} s" for word in spoken.missed)
         warn(f"{sound}: {spoken.found:.0%} of the text's words are heard; missing are {missed}")
+    if spoken.extra:
+        where = ", ".join(f"from {start:.1f} to {end:.1f} s" for start, end in spoken.extra[:MOST_NAMED])
+        warn(f"{sound}: more is spoken than the text says, {where}; the mouth follows the sound there")
 
 
 def _figures(spoken: Speech, animation: Animation, data: bytes) -> dict[str, Any]:
@@ -279,12 +341,8 @@ def _figures(spoken: Speech, animation: Animation, data: bytes) -> dict[str, Any
     }
 
 
-def _summary(output: Path, spoken: Speech, animation: Animation, data: bytes) -> str:
-    rate = 8 * len(data) / spoken.seconds / 1000
-    text = (
-        f"{display_name(output)}: {seconds_text(spoken.seconds)}, {len(animation)} frames at "
-        f"{rate_text(animation.rate)} frames/s, {len(data)} bytes, {rate:.2f} kbit/s"
+def _summary(output: Path, seconds: float, frames: int, rate: Fraction, size: int) -> str:
+    return (
+        f"{display_name(output)}: {seconds_text(seconds)}, {frames} frames at {rate_text(rate)} frames/s, "
+        f"{size} bytes, {8 * size / seconds / 1000:.2f} kbit/s"
     )
-    if spoken.found is None:
-        return text
-    return f"{text}; {spoken.found:.0%} of {len(spoken.words)} words heard"

@@ -5,15 +5,19 @@ from __future__ import annotations
 import importlib.util
 import json
 import shutil
+import subprocess
+import sys
 import wave
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pytest
 
 import fba
+from fba.face import resolve
+from tests.speech.test_live import babble
 
 Run = Callable[..., Any]
 CTM = "map 1 0.00 0.10 M\nmap 1 0.10 0.30 AE\nmap 1 0.40 0.10 P\n"
@@ -84,6 +88,10 @@ def test_a_stream_without_visemes_has_none_to_write(run: Run, timings: Path, tmp
         (["--timings", "{ctm}", "--mood", "happy", "--coding", "visemes"], "use it with --coding faps"),
         (["--timings", "{ctm}", "--mood", "hapy"], "did you mean 'happy'"),
         (["--timings", "{ctm}", "--mood", "happy=lots"], "--mood: "),
+        (["--audio", "-", "--text", "a"], "--audio - is spoken while it comes, and --text needs all of it"),
+        (["--audio", "-", "--timings", "{ctm}"], "and --timings needs all of it"),
+        (["--audio", "-", "--coding", "visemes"], "leave --coding visemes out"),
+        (["--timings", "{ctm}", "--pcm", "8000"], "--pcm goes with --audio -"),
         (["--text", "hello", "-o", "-"], "give the stream a name with -o"),
     ],
 )
@@ -173,3 +181,60 @@ def test_text_files_in_other_encodings_are_refused(run: Run, tmp_path: Path) -> 
     done = run("speak", "--text-file", text, "-o", tmp_path / "out.fba")
     assert done.code == 1
     assert "is not UTF-8 text (byte 3)" in done.err
+
+
+@pytest.fixture
+def pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[BinaryIO]:
+    """Standard input; what is written into it is read."""
+    with (tmp_path / "pipe").open("wb", buffering=0) as file, (tmp_path / "pipe").open("rb") as given:
+        monkeypatch.setattr(sys, "stdin", given)
+        yield file
+
+
+@pytest.mark.parametrize("rate", [8000, 16000])
+def test_what_comes_on_standard_input_is_spoken(rate: int, run: Run, pipe: BinaryIO, tmp_path: Path) -> None:
+    pipe.write(write_wave(tmp_path / "sound.wav", babble(2.0), rate).read_bytes())
+    target = tmp_path / "live.fba"
+    done = run("speak", "--audio", "-", "-o", target, "--mood", "sad", "--json")
+    assert done.code == 0, done.err
+    figures = json.loads(done.out)
+    assert figures["seconds"] == pytest.approx(32000 / rate, abs=0.01)
+    spoken = fba.read(target)
+    assert len(spoken) == figures["frames"] == np.ceil(25 * figures["seconds"])
+    assert spoken.face is not None
+    assert np.ptp(resolve(spoken.face)[:, 2]) > 20, "the jaw does not move"
+    assert target.stat().st_size == figures["size"]
+
+
+@pytest.mark.parametrize(
+    ("data", "more", "said"),
+    [
+        (b"", [], "standard input: the sound is empty: nothing came"),
+        (b"x", ["--pcm", "16000"], "the sound is empty: it has no samples"),
+        (b"this is no sound at all", [], "say the rate: `fba speak --audio - --pcm 16000`"),
+        (b"fLaC" + bytes(50), [], "the sound is FLAC, and only WAV"),
+        (b"1234", ["--pcm", "16000", "--fps", "5"], "needs 10 frames/s or more"),
+    ],
+)
+def test_what_is_no_sound_on_standard_input_is_refused(
+    data: bytes, more: list[str], said: str, run: Run, pipe: BinaryIO, tmp_path: Path
+) -> None:
+    pipe.write(data)
+    done = run("speak", "--audio", "-", "-o", tmp_path / "out.fba", *more)
+    assert done.code == 1
+    assert said in done.err
+    assert not (tmp_path / "out.fba").exists()
+
+
+def test_a_reader_that_leaves_ends_it(programs: Path, tmp_path: Path) -> None:
+    (tmp_path / "sound").write_bytes(babble(20.0).tobytes())
+    command = [programs / "fba", "speak", "--audio", "-", "--pcm", "16000", "-o", "-"]
+    with (tmp_path / "sound").open("rb") as source, subprocess.Popen(
+        command, stdin=source, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as done:  # fmt: skip
+        assert done.stdout is not None
+        assert done.stderr is not None
+        assert done.stdout.read(100)
+        done.stdout.close()
+        assert b"Traceback" not in done.stderr.read()
+    assert done.returncode in (1, 141)
