@@ -21,9 +21,12 @@ from fba.outlines import (
     fit_mask,
     methods,
     nearest,
+    outline_distances,
     read_mask,
 )
 from fba.outlines._distance import project, sample
+from fba.outlines._index import CHOICES
+from fba.outlines._index_file import pack_mask, unpack_mask
 from fba.outlines._tree import split_into_paths
 
 QUANTA = 96
@@ -48,13 +51,21 @@ def stacked(points: Sequence[Float64]) -> Float32:
     )
 
 
-def leave_one_out(name: str, described: Float32, method: Method, say: Callable[[str], None]) -> Row:
-    """Return the nearest other silhouette of each."""
+def leave_one_out(
+    name: str, described: Float32, method: Method, say: Callable[[str], None], masks: Sequence[Bool] = ()
+) -> Row:
+    """Return the nearest other silhouette of each. masks: to compare the outlines of the nearest, too."""
+    squares = np.array([unpack_mask(pack_mask(mask)) for mask in masks])
+    wanted = CHOICES + 1 if masks else 2
     projected = project(described)
     begun, neighbours, compared = time.perf_counter(), [], 0
     for number in range(len(described)):
-        found, _, tried = nearest(described[number], described, 2, projected=projected, ground=method.ground)
-        neighbours.append(int(found[found != number][0]))
+        found, _, tried = nearest(
+            described[number], described, wanted, projected=projected, ground=method.ground
+        )
+        others = found[found != number]
+        best = outline_distances(squares[number], squares[others]).argmin() if masks else 0
+        neighbours.append(int(others[best]))
         compared += tried
         if number % 200 == 0:
             say(f"{name}: {number} of {len(described)}")
@@ -70,6 +81,8 @@ def all_methods(
         method = methods()[name]
         described = stacked([method.describe(mask) for mask in masks])
         yield leave_one_out(name, described, method, say)
+        if name == "points":
+            yield leave_one_out("points, then outlines", described, method, say, masks)
 
 
 def unequal(masks: Sequence[Bool]) -> Row:
