@@ -14,7 +14,7 @@ from fba.animation import Animation
 from fba.arrays import Bool, Float64, Int32
 from fba.body import BapSolver, BodyModel
 from fba.face import FaceModel
-from fba.outlines import Choice, Figure, Hit, Index, View, build_index, draw_silhouette
+from fba.outlines import Choice, Figure, View, build_index, draw_silhouette
 from fba.outlines._figure import read_poses
 
 LIMBS = {
@@ -28,8 +28,8 @@ LIMBS = {
 """Limbs: the joint that carries each, and the one at its end."""
 VISIBLE = 0.25
 """Share of a limb's own silhouette that must be missing without it, for it to count as visible."""
-QUERIES = 60
-"""Pictures, at most."""
+QUERIES = 25
+"""Pictures from each camera, at most."""
 VIEWS = 24
 CAMERAS = (View(7.0), View(37.0), View(97.0))
 """Sides of the pictures, each between those of the index."""
@@ -37,11 +37,15 @@ CAMERAS = (View(7.0), View(37.0), View(97.0))
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A silhouette whose pose is known: directions (L, 3) of its limbs, and which are visible (L,)."""
+    """A silhouette whose pose is known: directions (L, 3) of its limbs, and which are visible (L,).
+
+    side: from where it is seen, degrees from where its hips face.
+    """
 
     mask: Bool
     directions: Float64
     visible: Bool
+    side: float
 
 
 class Measure:
@@ -60,6 +64,11 @@ class Measure:
         along = (matrices[self._ends[:, 1], :3, 3] - matrices[self._ends[:, 0], :3, 3]) @ root
         return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
 
+    def heading(self, baps: Int32) -> float:
+        """Return where the hips face, degrees to the figure's left from straight ahead."""
+        forward = self._solver.pose(baps)[0, :3, 2]
+        return float(np.degrees(np.arctan2(forward[0], forward[2])))
+
     def picture(self, faps: Int32, baps: Int32, view: View) -> Picture:
         """Return the picture of a pose from a side."""
         vertices, triangles = self._figure.vertices(faps, baps), self._figure.triangles
@@ -71,7 +80,7 @@ class Measure:
             limb = draw_silhouette(vertices, triangles[of_limb], view)
             rest = draw_silhouette(vertices, triangles[~of_limb], view)
             visible.append((limb & ~rest).sum() >= VISIBLE * limb.sum())
-        return Picture(whole, self.directions(baps), np.array(visible))
+        return Picture(whole, self.directions(baps), np.array(visible), view.yaw - self.heading(baps))
 
 
 def table(
@@ -86,15 +95,18 @@ def table(
     asked: list[Animation] = list(performances.values()) if other is None else [fba.read(other)]
     measure = Measure()
     poses = [measure.directions(baps) for baps in index.stored.baps]
+    headings = np.array([measure.heading(baps) for baps in index.stored.baps])
     results: dict[str, list[tuple[Float64, Bool, float]]] = {}
     for camera in CAMERAS:
         for animation in asked:
             say(f"{animation.name} from {camera.yaw:g} degrees")
-            pictures = _pictures(animation, every, camera, measure)
+            pictures = _pictures(animation, every if other is None else None, camera, measure)
             alone = [index.search(each.mask, 1)[0] for each in pictures]
             in_order = index.search_sequence([each.mask for each in pictures])
             for name, hits in (("nearest outline", alone), ("with time", in_order)):
-                results.setdefault(name, []).extend(_errors(index, poses, pictures, hits, camera))
+                sides = [hit.view.yaw - headings[hit.number // VIEWS] for hit in hits]
+                found = [poses[hit.number // VIEWS] for hit in hits]
+                results.setdefault(name, []).extend(_errors(pictures, found, sides))
             results.setdefault("nearest pose (bound)", []).extend(_bound(poses, pictures))
             results.setdefault("random pose", []).extend(_chance(poses, pictures))
     lines = [
@@ -114,9 +126,11 @@ def table(
     return lines
 
 
-def _pictures(animation: Animation, every: int, camera: View, measure: Measure) -> list[Picture]:
+def _pictures(animation: Animation, every: int | None, camera: View, measure: Measure) -> list[Picture]:
+    """Return pictures of the frames amid those of the index, or without a step, of frames spread evenly."""
     poses = read_poses(animation, FaceModel.default())
-    frames = range(every // 2, len(animation), every)[:QUERIES]
+    frames = range(every // 2, len(animation), every) if every else range(0, len(animation), 1)
+    frames = frames[:: max(len(frames) // QUERIES, 1)][:QUERIES]
     return [measure.picture(poses.faps[frame], poses.baps[frame], camera) for frame in frames]
 
 
@@ -126,15 +140,11 @@ def _off(found: Float64, true: Float64) -> Float64:
 
 
 def _errors(
-    index: Index, poses: Sequence[Float64], pictures: Sequence[Picture], hits: Sequence[Hit], camera: View
+    pictures: Sequence[Picture], found: Sequence[Float64], sides: Sequence[float]
 ) -> list[tuple[Float64, Bool, float]]:
     return [
-        (
-            _off(poses[hit.number // len(index.views)], each.directions),
-            each.visible,
-            abs((hit.view.yaw - camera.yaw + 180) % 360 - 180),
-        )
-        for each, hit in zip(pictures, hits, strict=True)
+        (_off(directions, each.directions), each.visible, abs((side - each.side + 180) % 360 - 180))
+        for each, directions, side in zip(pictures, found, sides, strict=True)
     ]
 
 

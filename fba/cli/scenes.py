@@ -79,8 +79,12 @@ class SceneOptions(Reading):
         help="With --body: which joint of the standard a joint of its skeleton is, Pelvis=HumanoidRoot; "
         "none: Hat=. Repeatable. Or a TOML file of such pairs.",
     )
-    arrange: Literal["side", "over"] | None = option(
-        help="Several files: side by side (default), or the others as drawings over the first."
+    arrange: Literal["side", "over", "colour", "wipe"] | None = option(
+        help="Several files: side by side (default); the others as drawings over the first; side by side, "
+        "coloured by their distance from the first; or two in one place, on either side of a line (wipe)."
+    )
+    root: Literal["own", "common"] | None = option(
+        help="Several bodies: each moves through its own places (default), or all through the first's."
     )
     camera: Any = option(
         type=CAMERA,
@@ -149,6 +153,10 @@ def check_files(files: tuple[Path, ...], how: SceneOptions, sound: SoundOptions,
     if len(files) < 2 and how.arrange is not None:
         single = f"; {files[0]} is one" if files else ""
         raise click.UsageError(f"--arrange needs two files or more{single}")
+    if how.root is not None and len(files) < 2:
+        raise click.UsageError("--root needs two files or more")
+    if how.arrange == "wipe" and len(files) != 2:
+        raise click.UsageError(f"--arrange wipe needs two files; {len(files)} are given")
 
 
 def check_sound_options(sound: SoundOptions) -> None:
@@ -233,6 +241,7 @@ def build_scene(
         from fba_player.scene.compare import CompareScene
 
         result = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
+        result.root = how.root or result.root
     for switch, state in (*how.shows, *([("lod", how.lod)] if how.lod is not None else [])):
         result.show(switch, state)
     result.follow, result.orbit = how.follow, how.orbit

@@ -5,9 +5,10 @@
     hits = index.search(read_mask("picture.png"))           # the nearest first: stream, frame, side
 
 A silhouette becomes a medial axis with radii (Blum 1967; Siddiqi et al. 2002), whose nodes are compared by
-the earth mover's distance. The l1 embedding of trees that this stands in for, and other baselines, are here,
-too: `methods` lists them. After: E. Ayan, Emotional facial animation by motion capture, chapter 4 (thesis,
-Bilkent University). May use: faces and bodies, which it draws itself, without OpenGL.
+the earth mover's distance; of the nearest ones, the outlines themselves are compared. The l1 embedding of
+trees that this stands in for, and other baselines, are here, too: `methods` lists them. After: E. Ayan,
+Emotional facial animation by motion capture, chapter 4 (thesis, Bilkent University). May use: faces and
+bodies, which it draws itself, without OpenGL.
 """
 
 from fba.outlines._distance import earth_movers_distance, lower_bounds
@@ -15,6 +16,7 @@ from fba.outlines._figure import Figure
 from fba.outlines._index import Choice, Hit, Index, build_index
 from fba.outlines._mask import fit_mask, read_mask
 from fba.outlines._methods import Method, methods
+from fba.outlines._overlap import outline_distances
 from fba.outlines._raster import View, draw_silhouette
 from fba.outlines._search import follow, nearest
 from fba.outlines._sheet import draw_sheet
@@ -43,5 +45,6 @@ __all__ = [
     "lower_bounds",
     "methods",
     "nearest",
+    "outline_distances",
     "read_mask",
 ]

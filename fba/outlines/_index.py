@@ -19,9 +19,10 @@ from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.outlines._distance import project
 from fba.outlines._figure import Figure, read_poses
-from fba.outlines._index_file import Stored, Stream, pack_mask, read_index, unpack_mask, write_index
+from fba.outlines._index_file import CANVAS, Stored, Stream, pack_mask, read_index, unpack_mask, write_index
 from fba.outlines._mask import fit_mask
 from fba.outlines._methods import describe_points
+from fba.outlines._overlap import outline_distances
 from fba.outlines._raster import View, draw_silhouette
 from fba.outlines._search import follow, nearest
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, bap_angles
@@ -29,12 +30,12 @@ from fba.tracks import BodyTrack, FaceTrack
 
 MOST_SILHOUETTES = 200_000
 """Largest number of silhouettes of an index, which take about 2 kB each."""
-POSE_WEIGHT = 0.15
+POSE_WEIGHT = 0.02
 """Cost of a mean change by 1 radian, or by 1000 of FAPs, from one picture to the next."""
-VIEW_WEIGHT = 0.03
+VIEW_WEIGHT = 0.01
 """Cost of a change of the side by 1 radian from one picture to the next."""
 CHOICES = 60
-"""Silhouettes for each picture among which a sequence is looked for."""
+"""Silhouettes nearest by the earth mover's distance, whose outlines are compared."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Hit:
     """A silhouette that was found.
 
     stream: name of the performance. frame: its number in there, from 0. seconds: its time. view: the side.
-    distance: the earth mover's, relative to the root of the outline's area. number: of the silhouette.
+    distance: `outline_distances`, relative to the longer side of the figure. number: of the silhouette.
     """
 
     stream: str
@@ -119,7 +120,7 @@ class Index:
 
         away_from: only from sides that are at least 60 degrees from this one.
         """
-        return self._nearest(_describe(mask), count, self._far_from(away_from))
+        return self._nearest(fit_mask(mask), count, self._far_from(away_from))
 
     def search_sequence(self, masks: Sequence[Bool]) -> list[Hit]:
         """Return a silhouette for each of several that follow each other in time.
@@ -127,7 +128,7 @@ class Index:
         Of 60 that are near each, those are chosen that are near and change least in pose and side from one to
         the next.
         """
-        found = [self._nearest(_describe(mask), CHOICES, self._far_from(None)) for mask in masks]
+        found = [self._nearest(fit_mask(mask), CHOICES, self._far_from(None)) for mask in masks]
         costs = [np.array([hit.distance for hit in hits]) for hits in found]
         steps = [self._change(before, after) for before, after in pairwise(found)]
         return [hits[number] for hits, number in zip(found, follow(costs, steps), strict=True)]
@@ -154,10 +155,16 @@ class Index:
         allowed = np.ones(len(self.views), dtype=bool) if view is None else _apart(self._yaws, view.yaw) >= 60
         return np.flatnonzero(np.tile(allowed, len(self.stored.pose_streams)))
 
-    def _nearest(self, query: Float64, count: int, among: Int64) -> list[Hit]:
+    def _nearest(self, mask: Bool, count: int, among: Int64) -> list[Hit]:
+        """Return those of the nearest by the earth mover's distance whose outlines are nearest, too."""
         rows = self.stored.descriptions[among]
-        numbers, distances, _ = nearest(query, rows, count, projected=self._projected[among])
-        return [self._hit(int(among[n]), float(d)) for n, d in zip(numbers, distances, strict=True)]
+        tried = max(count, CHOICES)
+        numbers, _, _ = nearest(describe_points(mask), rows, tried, projected=self._projected[among])
+        numbers = among[numbers]
+        others = np.array([self.silhouette(number) for number in numbers]).reshape(-1, CANVAS, CANVAS)
+        distances = outline_distances(unpack_mask(pack_mask(mask)), others)
+        order = np.argsort(distances, kind="stable")[:count]
+        return [self._hit(int(numbers[n]), float(distances[n])) for n in order]
 
     def _hit(self, number: int, distance: float) -> Hit:
         pose, view = divmod(number, len(self.views))
@@ -249,10 +256,6 @@ def _stream(name: str, animation: Animation) -> Stream:
     if body is not None:
         sent |= body.mask.any(axis=0)
     return Stream(name, animation.rate, shown, tuple(map(bool, sent)))
-
-
-def _describe(mask: Bool) -> Float64:
-    return describe_points(fit_mask(mask))
 
 
 def _apart(yaws: Float64, yaw: Float64 | float) -> Float64:

@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from scipy.spatial.distance import cdist
 from scipy.stats import wasserstein_distance
 
-from fba.outlines import earth_movers_distance, follow, lower_bounds, nearest
+from fba.outlines import earth_movers_distance, follow, lower_bounds, nearest, outline_distances
 from fba.outlines._distance import Ground, project, sample
 
 GROUNDS: tuple[Ground, ...] = ("cityblock", "euclidean")
@@ -96,3 +96,15 @@ def test_a_sequence_is_the_cheapest_of_all() -> None:
 
     assert tuple(follow(costs, steps)) == min(itertools.product(range(3), repeat=5), key=total)
     assert follow(costs[:1], []) == [int(costs[0].argmin())]
+
+
+def test_outlines_that_move_are_that_far_apart() -> None:
+    y, x = np.mgrid[:100, :100]
+    discs = [np.hypot(y - 49.5, x - 49.5) < radius for radius in (30, 31, 32, 34)]
+    apart = 100 * outline_distances(discs[0], np.stack(discs))
+    assert apart[0] == 0
+    assert apart[1:3] == pytest.approx([1, 2], rel=0.25)  # pixels, less where distances are cut off
+    assert (np.diff(apart) > 0).all()
+    aside = np.stack([np.roll(discs[0], shift, (0, 1)) for shift in ((3, 0), (-2, 5))])
+    assert outline_distances(discs[0], aside) == pytest.approx(0)  # figures are compared in the middle
+    assert outline_distances(discs[0], discs[0][None, :, ::-1]) == pytest.approx(0)

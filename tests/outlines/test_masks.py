@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageOps
 
 from fba import Limits
+from fba.arrays import Bool
 from fba.errors import FbaWarning, FormatError, LimitError
-from fba.outlines import find_nodes, fit_mask, read_mask
+from fba.outlines import find_nodes, fit_mask, outline_distances, read_mask
+from fba.outlines._index_file import pack_mask, unpack_mask
 from fba.outlines._skeleton import medial_axis
 
 Draw = Callable[..., Path]
@@ -98,6 +101,69 @@ def test_a_background_that_is_not_plain(tmp_path: Path) -> None:
     Image.fromarray(noise).save(tmp_path / "noise.png")
     with pytest.raises(FormatError, match=r"no plain background: \d+% .* transparent around it"):
         read_mask(tmp_path / "noise.png")
+
+
+def photograph(light: float = 1.0, shadow: float = 0.0, noise: float = 4.0) -> Image.Image:
+    """Return a figure before a wall that is lit from a side, with its shadow on the floor, and noise.
+
+    light: of the darkest corner of the wall, a share. shadow: its darkness. noise: of the camera, levels.
+    """
+    height, width = 320, 200
+    y, x = np.mgrid[:height, :width]
+    wall = np.array([186, 178, 160]) * (1 - (1 - light) * ((x + y) / (height + width)) ** 2)[..., None]
+    floor = ((x - 130) / 60) ** 2 + ((y - 296) / 8) ** 2 < 1
+    wall[floor] *= 1 - shadow
+    pixels = Image.fromarray(wall.astype(np.uint8))
+    draw = ImageDraw.Draw(pixels)
+    draw.ellipse((85, 30, 115, 66), fill=(190, 140, 110))
+    draw.rectangle((76, 66, 124, 180), fill=(60, 80, 150))
+    for left in (78, 104):
+        draw.rectangle((left, 180, left + 18, 300), fill=(50, 45, 40))
+    noisy = np.asarray(pixels) + np.random.default_rng(3).normal(0, noise, (height, width, 3))
+    return Image.fromarray(np.clip(noisy, 0, 255).astype(np.uint8))
+
+
+def squared(mask: Bool) -> Bool:
+    return unpack_mask(pack_mask(mask))
+
+
+def saved(picture: Image.Image, path: Path, **settings: Any) -> Path:
+    picture.save(path, **settings)
+    return path
+
+
+def turned_by_camera(picture: Image.Image, path: Path) -> Path:
+    exif = Image.Exif()
+    exif[0x0112] = 6  # the camera was held a quarter to the left
+    return saved(picture.rotate(90, expand=True), path, exif=exif)
+
+
+@pytest.mark.parametrize(
+    "vary",
+    [
+        lambda path: saved(photograph(light=0.55), path),
+        lambda path: saved(photograph(shadow=0.4), path),
+        lambda path: saved(photograph(light=0.6, shadow=0.35, noise=8), path, quality=40),
+        lambda path: saved(photograph().resize((700, 1120)), path),
+        lambda path: saved(ImageOps.invert(photograph()), path),
+        lambda path: saved(photograph().convert("L"), path),
+        lambda path: turned_by_camera(photograph(), path),
+    ],
+    ids=["light from a side", "shadow", "all of it, compressed", "large", "negative", "grey", "turned"],
+)
+def test_photographs_before_a_wall(tmp_path: Path, vary: Callable[[Path], Path]) -> None:
+    plain = fit_mask(read_mask(saved(photograph(noise=0), tmp_path / "plain.png")))
+    mask = fit_mask(read_mask(vary(tmp_path / "picture.jpg")))
+    away = float(outline_distances(squared(plain), squared(mask)[None])[0])
+    assert away < 0.01
+
+
+def test_a_few_transparent_pixels_are_no_outline(drawn: Draw) -> None:
+    path = drawn(BOX, mode="RGBA", paper=(255, 255, 255, 255), ink=(0, 0, 0, 255))
+    with Image.open(path) as image:
+        image.putpixel((0, 0), (255, 255, 255, 0))
+        image.save(path)
+    assert np.array_equal(read_mask(path), read_mask(drawn(BOX, suffix=".bmp")))
 
 
 def test_large_pictures_are_reduced_or_refused(drawn: Draw) -> None:

@@ -72,7 +72,8 @@ def command(
     paused: bool = option(default=False, help="Start paused; the space key plays."),
     how: SceneOptions = group(
         arrange=option(
-            help="Several files: side by side (default), or over each other (default with --compare)."
+            help="Several files: side by side (default), over each other (default with --compare), side by "
+            "side in colours of their distance from the first (colour), or two with a line between (wipe)."
         )
     ),
 ) -> None:

@@ -36,6 +36,8 @@ REFERENCE_HEIGHT = 720
 MIN_SCALE = 0.35
 CROWDED_LENGTH = 7.0
 """Lines shorter than this (pixels) are drawn fainter, so that a fine mesh is a tint, not a black spot."""
+NEAREST = 0.9
+"""Share of the way to the camera to which a name is lifted at most."""
 HIDDEN_OPACITY = 0.2
 """Opacity of a dot behind a surface."""
 MIN_DOT_RADIUS = 0.8
@@ -208,7 +210,7 @@ class ExtrasRenderer:
         towards = eye - at
         facing = np.einsum("ij,ij->i", dots.facing, towards) >= 0
         away = np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-6)
-        nearer = project(at + towards * (dots.lift / away), matrix, size)[1]
+        nearer = project(at + towards * np.minimum(dots.lift / away, NEAREST), matrix, size)[1]
         inside = facing & np.isfinite(depth) & ((pixel >= 0) & (pixel < size)).all(axis=1)
         if not 0 < inside.sum() <= MAX_NAMES:
             return

@@ -27,6 +27,8 @@ from fba_player.gl._silhouette import Outliner
 from fba_player.view._camera import Camera
 from fba_player.view._view import CAPSULE_FLOATS, Eye, Mesh, View
 
+WIPE_LINE = 1 / 720
+"""Half the width of the line of a wipe, as a share of the picture's height."""
 MAX_BLOBS = 8
 """Largest number of soft shadows on the ground."""
 HIDDEN_OPACITY = 0.16
@@ -90,6 +92,22 @@ class Renderer:
         size: width and height of the framebuffer in pixels. now: seconds, by which levels of detail change
         gradually; None for a picture that does not depend on the one before.
         """
+        steps = self._draw_whole(view, camera, size, now)
+        if view.wipe is None:
+            return steps
+        gl, morphing = self._gl, self.morphing
+        line = round(view.wipe.at * size[0])
+        gl.fbo.scissor = (line, 0, size[0] - line, size[1])
+        others = self._draw_whole(view.wipe.view, camera, size, now)
+        half = max(round(WIPE_LINE * size[1]), 1)
+        gl.fbo.scissor = (line - half, 0, 2 * half, size[1])
+        gl.fbo.clear(1.0, 1.0, 1.0, 1.0)
+        gl.fbo.scissor = None
+        self._details.morphing |= morphing
+        bands = np.concatenate([steps.bands, others.bands])
+        return Steps([*steps.rectangles, *others.rectangles], bands)
+
+    def _draw_whole(self, view: View, camera: Camera, size: tuple[int, int], now: float | None) -> Steps:
         gl = self._gl
         aspect = size[0] / max(size[1], 1)
         seen = camera.view_matrix()

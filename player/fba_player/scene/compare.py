@@ -12,11 +12,14 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba_player.scene._compare_timeline import CompareTimeline
+from fba_player.scene._difference_colours import DifferenceColours, distances, round_up
 from fba_player.scene._differences import Differences, differences
+from fba_player.scene._display_options import HAIRS
+from fba_player.scene._fap_heatmap import heat_legend
 from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
 from fba_player.scene.scene import Scene
 from fba_player.view._camera import FACE_PRESETS, PRESETS, Camera, Subject
-from fba_player.view._view import Extras, View
+from fba_player.view._view import Extras, View, Wipe
 from fba_player.view.protocols import Timed
 
 if TYPE_CHECKING:
@@ -25,8 +28,13 @@ if TYPE_CHECKING:
     from fba_player._figure.face import FaceFigure
 
 
-ARRANGEMENTS = ("side", "over")
-"""Side by side; or over the first, as coloured drawings of feature points and bones."""
+ARRANGEMENTS = ("side", "over", "colour", "wipe")
+"""Side by side; over the first, as coloured drawings of feature points and bones; side by side, coloured by
+how far they are from the first; two in the same place, one on each side of a line."""
+ROOTS = ("own", "common")
+"""Bodies move as they were recorded; or all where the first one's root is."""
+SAMPLES = 24
+"""Number of moments from which the scale of the colours is taken."""
 COLOURS = ("#2f9bff", "#ff5a36", "#39c26b", "#c266ff", "#f2b500")
 """Colours (sRGB) of the drawings over the first, in turn."""
 FIGURE_DISTANCE = 1.12
@@ -40,20 +48,27 @@ CAPTION_HEIGHT = 0.96
 
 
 def _rebuild(
-    scenes: Sequence[Scene], arrangement: str, names: Sequence[str], orbit: float | None
+    scenes: Sequence[Scene], arrangement: str, names: Sequence[str], state: dict[str, Any]
 ) -> CompareScene:
     scene = CompareScene(scenes, arrangement=arrangement, names=names)
-    scene.orbit = orbit
+    vars(scene).update(state)
     return scene
 
 
 class CompareScene(Timed[CompareTimeline]):
     """Several scenes shown together on one timeline; a `Showable` like `Scene`.
 
-    scenes: at least one. arrangement: "side" or "over"; may be set at any time. names: captions of the
+    scenes: at least one. arrangement: one of `ARRANGEMENTS`; may be set at any time. names: captions of the
     figures side by side, by default the animations' names; "" for none. A head without a body is shown at
     the height of the heads on bodies. Figures stand side by side as seen by the last `camera`.
+
+    May be set at any time: root, one of `ROOTS`; wipe, where the line is, 0..1 of the picture's width;
+    second, the number of the scene that is seen on its right.
     """
+
+    root = "own"
+    wipe = 0.5
+    second = 1
 
     def __init__(
         self, scenes: Sequence[Scene], *, arrangement: str = "side", names: Sequence[str] | None = None
@@ -72,14 +87,17 @@ class CompareScene(Timed[CompareTimeline]):
         self._drawings = [Drawing(COLOURS[number % len(COLOURS)]) for number in range(len(scenes))]
         self._apart: float | None = None
         self._differences: dict[tuple[int, int], Differences] = {}
+        self._colours = DifferenceColours()
+        self._scale: tuple[tuple[int, str], float] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy in another process builds its figures anew."""
-        return _rebuild, (self.scenes, self.arrangement, self.names, self.orbit)
+        state = {name: getattr(self, name) for name in ("orbit", "root", "wipe", "second")}
+        return _rebuild, (self.scenes, self.arrangement, self.names, state)
 
     @property
     def arrangement(self) -> str:
-        """ "side" or "over"."""
+        """One of `ARRANGEMENTS`."""
         return self._arrangement
 
     @arrangement.setter
@@ -146,7 +164,7 @@ class CompareScene(Timed[CompareTimeline]):
         if preset is not None and preset not in PRESETS:
             raise ValueError(f"no camera preset {preset!r}; there are {', '.join(PRESETS)}")
         camera = self.scenes[0].camera(preset, aspect)
-        if self._arrangement == "side" and len(self.scenes) > 1:
+        if self._in_a_row and len(self.scenes) > 1:
             camera = replace(camera, field_of_view=FIELD_OF_VIEW)
         self._yaw = camera.yaw
         upper = [scene.gesture_subject or scene.face_subject for scene in self.scenes if scene.has_body]
@@ -177,20 +195,87 @@ class CompareScene(Timed[CompareTimeline]):
         times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
         if self._arrangement == "over":
             return self._over(times)
+        if self._arrangement == "wipe":
+            return self._wiped(times)
+        views = [scene.view_at(own) for scene, own in zip(self.scenes, times, strict=True)]
+        most = 0.0
+        if self._arrangement == "colour" and len(views) > 1:
+            most = self._most()
+            for number in range(1, len(views)):
+                faces = [mesh for mesh in views[number].faces if mesh.shape.kind not in HAIRS]
+                offset = self._compared_at(number, times)
+                faces = self._colours.paint(faces, views[0].faces, offset, most)
+                views[number] = replace(views[number], faces=faces)
+        for number, view in enumerate(views):
+            views[number] = self._captioned(number, move_view(view, self._placed(number, times)), times)
+        joined = join_views(views)
+        if not most:
+            return joined
+        legend = heat_legend("Difference", "mm from the first", most * 1000)
+        return replace(joined, extras=replace(joined.extras or Extras(), legend=legend))
+
+    @property
+    def _in_a_row(self) -> bool:
+        return self._arrangement in ("side", "colour")
+
+    def _captioned(self, number: int, view: View, times: list[float]) -> View:
+        """Return the moved view of a scene with its name above the head."""
+        if not self.names[number] or len(self.scenes) < 2:
+            return view
+        head = self._heads[number]
+        x, y, z = head.centre
+        place = np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number)
+        if self._arrangement == "wipe":
+            aside = SHOULDER_HALF_WIDTH if self.scenes[number].has_body else head.half_width
+            place = place + self._right() * aside * (1.0 if number else -1.0)
+        caption = make_caption(self.names[number], place + np.array(self.scenes[0].travel(times[0])))
+        extras = view.extras or Extras()
+        return replace(view, extras=replace(extras, dots=(*extras.dots, caption)))
+
+    def _wiped(self, times: list[float]) -> View:
+        """Return the first scene, and the second one in its place on the right of the line."""
         views = []
-        travelled = np.array(self.scenes[0].travel(times[0]))
-        for number, (scene, own_time) in enumerate(zip(self.scenes, times, strict=True)):
-            shift = self._shift(number) + travelled - np.array(scene.travel(own_time))
-            view = move_view(scene.view_at(own_time), shift)
-            if self.names[number] and len(self.scenes) > 1:
-                head = self._heads[number]
-                x, y, z = head.centre
-                place = np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number)
-                extras = view.extras or Extras()
-                caption = make_caption(self.names[number], place + travelled)
-                view = replace(view, extras=replace(extras, dots=(*extras.dots, caption)))
-            views.append(view)
-        return join_views(views)
+        for number in (0, min(self.second, len(self.scenes) - 1)):
+            view = move_view(self.scenes[number].view_at(times[number]), self._placed(number, times))
+            views.append(self._captioned(number, view, times))
+        return replace(views[0], wipe=Wipe(views[1], min(max(self.wipe, 0.0), 1.0)))
+
+    def _placed(self, number: int, times: list[float]) -> Float64:
+        """Return (3,): how far a scene is moved at its own time; a following camera follows the first."""
+        if self.root == "common":
+            return self._shift(number) + self._apart_at_start(number) - self._apart_now(number, times)
+        own = np.array(self.scenes[number].travel(times[number]))
+        return self._shift(number) + np.array(self.scenes[0].travel(times[0])) - own
+
+    def _apart_at_start(self, number: int) -> Float64:
+        """Return (3,): from the first body's root to that of another at the start; zeros without bodies."""
+        return self._apart_now(number, [float(scene.start) for scene in self.scenes])
+
+    def _apart_now(self, number: int, times: list[float]) -> Float64:
+        if not (self.scenes[0].has_body and self.scenes[number].has_body):
+            return np.zeros(3)
+        return self.scenes[number].place(times[number]) - self.scenes[0].place(times[0])
+
+    def _compared_at(self, number: int, times: list[float]) -> Float64:
+        """Return (3,): from where the first body is to where another would be without any difference."""
+        if self.root == "common":
+            return self._apart_now(number, times)
+        return self._apart_at_start(number)
+
+    def _most(self) -> float:
+        """Return the largest distance of any vertex from the first scene's, rounded up, metres."""
+        key = (self.timeline.arrived, self.root)
+        if self._scale is None or self._scale[0] != key:
+            most = 0.0
+            for time in np.linspace(float(self.timeline.start), float(self.timeline.end), SAMPLES).tolist():
+                times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
+                first = self.scenes[0].view_at(times[0]).faces
+                for number in range(1, len(self.scenes)):
+                    faces = self.scenes[number].view_at(times[number]).faces
+                    for away in distances(faces, first, self._compared_at(number, times)):
+                        most = max(most, float(away.max(initial=0.0)))
+            self._scale = (key, round_up(most))
+        return self._scale[1]
 
     @cached_property
     def _heads(self) -> list[Subject]:
@@ -214,7 +299,6 @@ class CompareScene(Timed[CompareTimeline]):
 
     def _over(self, times: list[float]) -> View:
         views = [self.scenes[0].view_at(times[0])]
-        travelled = np.array(self.scenes[0].travel(times[0]))
         for number in range(1, len(self.scenes)):
             scene, own_time = self.scenes[number], times[number]
             before, scene.view = scene.view, "points"
@@ -222,8 +306,7 @@ class CompareScene(Timed[CompareTimeline]):
                 drawn = self._drawings[number - 1](scene.view_at(own_time), len(scene.figure.eyeballs))
             finally:
                 scene.view = before
-            shift = self._height(number) + travelled - np.array(scene.travel(own_time))
-            views.append(move_view(drawn, shift))
+            views.append(move_view(drawn, self._placed(number, times)))
         return join_views(views)
 
     def _right(self) -> Float64:
@@ -233,12 +316,12 @@ class CompareScene(Timed[CompareTimeline]):
 
     def _shift(self, number: int) -> Float64:
         """Return (3,): the shift of a figure in the arrangement."""
-        if self._arrangement == "over":
-            return self._height(number)
-        widths = [self._half_width(scene) for scene in self.scenes]
-        along = sum(widths[:number]) - sum(widths[number + 1 :])
         # Recordings begin anywhere: each figure is brought to where the first one is.
         to_first = (self._stands[0] - self._stands[number]) * (1.0, 0.0, 1.0)
+        if not self._in_a_row:
+            return self._height(number) + (to_first if self._arrangement == "wipe" else 0.0)
+        widths = [self._half_width(scene) for scene in self.scenes]
+        along = sum(widths[:number]) - sum(widths[number + 1 :])
         height = self._height(number) * (0.0, 1.0, 0.0)
         return np.asarray(self._right() * along * FIGURE_DISTANCE + to_first + height)
 
@@ -271,7 +354,9 @@ class CompareScene(Timed[CompareTimeline]):
         low = min(a - width for a, width in zip(along, widths, strict=True))
         high = max(a + width for a, width in zip(along, widths, strict=True))
         bottom = min(float(p[1]) - s.half_height for p, s in zip(centres, subjects, strict=True))
-        room = 1.05 if any(self.names) and self._arrangement == "side" else 1.0  # for captions
+        room = (1.15 if self._arrangement == "wipe" else 1.05) if any(self.names) else 1.0  # for captions
+        if self._arrangement == "over":
+            room = 1.0
         top = max(float(p[1]) + s.half_height * room for p, s in zip(centres, subjects, strict=True))
         middle = np.mean(centres, axis=0)
         middle = middle + right * ((low + high) / 2 - float(middle @ right))

@@ -232,6 +232,11 @@ class Scene(Timed[Timeline]):
         centre = self.subject.centre
         return (float(joints[0, 0, 3]) - centre[0], 0.0, float(joints[0, 2, 3]) - centre[2])
 
+    def place(self, time: float) -> Float64:
+        """Return where the body's root is at a time, (3,), metres; zeros without a body."""
+        joints = self._pose_at(time)[1]
+        return np.zeros(3) if joints is None else np.array(joints[0, :3, 3])
+
     def head_travel(self, time: float) -> tuple[float, float, float]:
         """Return the displacement (x, y, z) of the head from the start, metres; zeros without a body."""
         x, y, z = np.subtract(self._face_at(time).centre, self.face_subject.centre).tolist()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from fba_player.scene.compare import CompareScene
 from fba_player.session._actions import act
 from fba_player.session._keys import by_name
 from fba_player.session._pages import page_of
@@ -18,6 +19,8 @@ BAR_MARGIN = 16
 ORBIT_SPEED = 0.35
 """Degrees per pixel."""
 ZOOM_STEP = 0.9
+WIPE_REACH = 12.0
+"""Pixels, at a display scale of 1, from the line of a wipe within which the mouse takes hold of it."""
 CLICK_DISTANCE = 4.0
 """Pixels, at a display scale of 1, by which the mouse may move in a click on a page."""
 
@@ -73,6 +76,8 @@ class Controls:
                 self._held = "item"
             else:
                 self._held = "orbit" if button == "left" and not flat else "pan"
+            if button == "left" and self._at_wipe(x):
+                self._held = "wipe"
             self._may_click = button == "left"
 
     def move(self, x: float, y: float) -> None:
@@ -86,6 +91,8 @@ class Controls:
         page = page_of(self.session)
         if self._held == "timeline":
             self._seek(x)
+        elif self._held == "wipe" and isinstance(self.session.scene, CompareScene):
+            self.session.scene.wipe = min(max(x / max(self.session.size[0], 1), 0.0), 1.0)
         elif self._held == "item" and page is not None and page.drag is not None:
             page.drag(self.session, x, y)
         elif self._held == "orbit" and (right or down):
@@ -119,6 +126,12 @@ class Controls:
         """Return left and right end of the plain timeline, in pixels."""
         margin = BAR_MARGIN * self.session.scale
         return margin, max(self.session.size[0] - margin, margin + 1)
+
+    def _at_wipe(self, x: float) -> bool:
+        """Return whether a pixel is at the line between two figures that are compared."""
+        scene = self.session.scene
+        wiped = isinstance(scene, CompareScene) and scene.arrangement == "wipe"
+        return wiped and abs(x - scene.wipe * self.session.size[0]) <= WIPE_REACH * self.session.scale
 
     def _seek(self, x: float) -> None:
         low, high = self.bar()

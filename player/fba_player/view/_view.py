@@ -260,7 +260,7 @@ class View:
     that hide them. blobs: float32 (K, 4), soft shadows on the ground: x, z, radius, darkness. ground: whether
     there is a ground. background: colour behind everything (sRGB, 0..1) instead of the studio. extras:
     annotations drawn over the figure. lod: the level of detail of faces, "auto" by size, or a number, 0 for
-    all triangles, also of bodies.
+    all triangles, also of bodies. wipe: what is drawn in the right part of the picture.
     """
 
     meshes: list[Mesh] = field(default_factory=list)
@@ -273,6 +273,18 @@ class View:
     background: tuple[float, float, float] | None = None
     extras: Extras | None = None
     lod: str = "auto"
+    wipe: Wipe | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Wipe:
+    """Another view, drawn in place of the first to the right of a line.
+
+    at: where the line is, 0..1 of the picture's width.
+    """
+
+    view: View
+    at: float
 
 
 def spheres(centres: npt.ArrayLike, radii: npt.ArrayLike, colour: tuple[float, ...]) -> Float32:

@@ -12,8 +12,9 @@ from fba_player.export._offscreen import Offscreen
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Transport
 from fba_player.scene._compare_timeline import CompareTimeline
+from fba_player.scene._difference_colours import distances, round_up
 from fba_player.scene._differences import differences
-from fba_player.scene.compare import CompareScene
+from fba_player.scene.compare import ROOTS, CompareScene
 from fba_player.scene.scene import Scene
 from player_tracks import body_track, face_track
 
@@ -233,3 +234,71 @@ def test_both_figures_are_in_the_picture(pair: CompareScene, opengl: None) -> No
     shades = [half[skin].sum(axis=1) for half, skin in zip(mouths, skins, strict=True)]
     dark = [float(np.percentile(shade, 2)) for shade in shades]
     assert dark[1] < 0.8 * dark[0]
+
+
+def test_colours_are_of_the_distance_from_the_first(pair: CompareScene) -> None:
+    pair.arrangement = "colour"
+    try:
+        view = pair.view_at(0.0)
+        count = len(pair.scenes[0].view_at(0.0).faces)
+        painted = view.faces[count:]
+        assert all(mesh.looks is None for mesh in view.faces[:count])
+        assert view.extras is not None
+        legend = view.extras.legend
+        assert legend is not None
+        own = pair.scenes[1].view_at(0.0).faces
+        away = distances(own, pair.scenes[0].view_at(0.0).faces, np.zeros(3))
+        most = max(float(each.max()) for each in away)
+        assert most <= legend.most / 1000 < 2.5 * most
+        parts = {mesh.shape.name: mesh for mesh in painted}
+        moved = {mesh.shape.name: each for mesh, each in zip(own, away, strict=True)}
+        skin = max(moved, key=lambda name: float(moved[name].max()))
+        looks = parts[skin].looks
+        assert looks is not None
+        still, far = looks[moved[skin] == 0, :3], looks[moved[skin].argmax(), :3]
+        assert (still == still[0]).all()
+        assert np.abs(far - still[0]).max() > 0.2
+        assert pair.view_at(0.04).faces[-1].shape is view.faces[-1].shape  # renderers keep what they know
+    finally:
+        pair.arrangement = "side"
+
+
+def test_a_wipe_shows_each_on_its_side_of_the_line(pair: CompareScene) -> None:
+    pair.arrangement = "wipe"
+    size = (160, 120)
+    try:
+        pictures = {}
+        for at in (0.0, 0.5, 1.0):
+            pair.wipe = at
+            with Offscreen(pair, size) as offscreen:
+                pictures[at] = offscreen.draw(0.0).astype(int)
+        line = slice(78, 82)
+        for half, whole in ((slice(2, 76), 1.0), (slice(84, 158), 0.0)):
+            assert np.abs(pictures[0.5][:, half] - pictures[whole][:, half]).max() <= 2
+        assert np.abs(pictures[0.0][:, 10:150] - pictures[1.0][:, 10:150]).max() > 60
+        assert (pictures[0.5][:, line].min(axis=(0, 2)) > 200).any()
+    finally:
+        pair.arrangement, pair.wipe = "side", 0.5
+
+
+def test_a_common_root_is_that_of_the_first() -> None:
+    scene = CompareScene([Scene(walk([0] * 5, 100)), Scene(walk([0] * 5, 300))])
+    scene.arrangement = "wipe"
+    apart = {}
+    for root in ROOTS:
+        scene.root = root
+        for time in (0.0, 0.16):
+            view = scene.view_at(time)
+            assert view.wipe is not None
+            eyes = [each.eyes[0].matrix[:3, 3] for each in (view, view.wipe.view)]
+            apart[root, time] = float(np.linalg.norm(eyes[1] - eyes[0]))
+    own = apart["own", 0.16] - apart["own", 0.0]
+    assert abs(own) > 0.1
+    assert apart["common", 0.16] == pytest.approx(apart["common", 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("distance", "rounded"), [(0.0, 1e-5), (0.0011, 0.002), (0.004, 0.005), (0.6, 1.0), (2.0, 2.0)]
+)
+def test_scales_are_round(distance: float, rounded: float) -> None:
+    assert round_up(distance) == pytest.approx(rounded)

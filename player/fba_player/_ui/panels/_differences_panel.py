@@ -19,7 +19,8 @@ LISTED_PARAMETERS = 9
 """Number of parameters listed: those that differ most."""
 MAX_CURVE_POINTS = 1500
 """Most points of a curve; longer ones are thinned to the largest value of each part."""
-ARRANGEMENTS = {"side": "side by side", "over": "over each other"}
+ARRANGEMENTS = {"side": "beside", "over": "over", "colour": "in colour", "wipe": "wipe"}
+ROOT_TEXTS = {"own": "own places", "common": "one place"}
 DEGREES = 180 / np.pi * 1e-5
 
 
@@ -44,6 +45,7 @@ class DifferencesPanel(Panel):
         self._second = min(self._second, len(scene.scenes) - 1)
         if len(scene.scenes) > 2:
             self._second = 1 + choose_name("##second", scene.names[1:], self._second - 1)
+        scene.second = self._second
         differences = scene.differences(self._second)
         if self._known is None or self._known[0] is not differences:
             self._known = (differences, differences.largest(LISTED_PARAMETERS))
@@ -63,6 +65,8 @@ class DifferencesPanel(Panel):
         if arrangement is not None:
             scene.arrangement = arrangement
             session.viewpoint.reset()
+        if scene.has_body:
+            scene.root = choose_by_button(ROOT_TEXTS, scene.root) or scene.root
 
     def _table(self, session: Session, largest: list[Largest]) -> None:
         flags = imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.row_bg | imgui.TableFlags_.pad_outer_x
