@@ -50,8 +50,6 @@ IMPORTANCE = 300.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
 LID_MARGINS = tuple(f"{side} {lid} lid" for side in ("left", "right") for lid in ("upper", "lower"))
-MARGIN_SHARE = 0.5
-"""The vertices of the margins of the lids stay while at least this share of the triangles is left."""
 LID_SHARE = 4.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5
@@ -124,7 +122,7 @@ class FaceSimplification:
             model,
             parts=parts,
             bound=bound.astype(np.int32),
-            tables=_fit_tables(model, level, self._pinned, self.mesh.positions) if tables else (),
+            tables=_fit_tables(model, level, self._unmoved(level), self.mesh.positions) if tables else (),
             levels=(),
         )
         return DetailLevel(
@@ -137,10 +135,10 @@ class FaceSimplification:
         used[self.model.triangles] = True
         return used
 
-    @cached_property
-    def _pinned(self) -> Int32:
-        """Vertices that stay, which move exactly as they do on the full face."""
-        return np.flatnonzero(self._kept & self._used).astype(np.int32)
+    def _unmoved(self, level: Level) -> Int32:
+        """Return vertices that are still where they were because they had to; they move exactly as before."""
+        still = (level.positions[level.parents] == self.mesh.positions).all(axis=1)
+        return np.flatnonzero(self._kept & still & self._used).astype(np.int32)
 
 
 def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplification:
@@ -160,7 +158,7 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         )
     deformer = Deformer(model)
     poses = np.stack([deformer.local(_values(pose)) for pose in POSES]).astype(np.float64)
-    kept = _find_pinned(model, margins=fewest >= MARGIN_SHARE * len(model.triangles))
+    kept, lines = _find_pinned(model), _find_lines(model)
     mesh = simplify(
         poses,
         model.triangles,
@@ -168,8 +166,9 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         pinned=kept,
         looks=part_looks(model),
         importance=_importance(model),
+        lines=lines,
     )
-    return FaceSimplification(model, mesh, poses, kept)
+    return FaceSimplification(model, mesh, poses, kept | (lines > 0))
 
 
 def level_sizes(model: FaceModel, count: int) -> list[int]:
@@ -193,17 +192,11 @@ def _values(pose: dict[int, int]) -> Float32:
     return values
 
 
-def _find_pinned(model: FaceModel, *, margins: bool) -> Bool:
-    """Return (V,): vertices of feature points, and some around each pupil, which give its size. margins:
-    whether also those of the margins of the lids."""
+def _find_pinned(model: FaceModel) -> Bool:
+    """Return (V,): vertices of feature points, and some around each pupil, which give its size."""
     pinned = np.zeros(len(model.vertices), dtype=bool)
     pinned[model.bound[model.bound >= 0]] = True
     eyes = {part.name for part in model.of_kind("eye")}
-    if margins:
-        marks = find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
-        for name in LID_MARGINS:
-            margin = np.isin(marks.surface.number, marks.contour(name))
-            pinned[marks.surface.pool[margin]] = True
     for fap in PUPIL_FAP.values():
         for mesh in model.table_of[fap].meshes if fap in model.table_of else ():
             size = np.linalg.norm(mesh.displacements, axis=2).max(axis=1, initial=0.0)
@@ -213,6 +206,15 @@ def _find_pinned(model: FaceModel, *, margins: bool) -> Bool:
                 around = np.argsort(np.arctan2(off[:, 1], off[:, 0]))
                 pinned[rim[around[:: -(-len(rim) // RIM_VERTICES)]]] = True
     return pinned
+
+
+def _find_lines(model: FaceModel) -> Int32:
+    """Return (V,): a bit for each margin of a lid that a vertex is on."""
+    marks = find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
+    lines = np.zeros(len(model.vertices), dtype=np.int32)
+    for bit, name in enumerate(LID_MARGINS):
+        lines[marks.surface.pool[np.isin(marks.surface.number, marks.contour(name))]] |= 1 << bit
+    return lines
 
 
 def _importance(model: FaceModel) -> Float64:
