@@ -28,6 +28,8 @@ COSINE = float(np.cos(np.radians(1.0)))
 """Of alpha, the least angle between a plane and those that determine a position already."""
 MIN_TURN_COSINE = 0.2
 """No triangle may turn by more than the angle of this cosine, in any pose."""
+MIN_COMPACTNESS = 0.1
+"""No triangle may become less compact than this, where 1 is that of an equilateral one."""
 FREE, ON_LINE, PINNED = 0, 1, 2
 """Vertices that may move; those on a border or seam, which only collapse along it; those that stay."""
 
@@ -557,7 +559,7 @@ def _on_border(surface: Surface, v: int) -> bool:
 
 @compiled
 def _turns_over(surface: Surface, a: int, b: int, t: float, count: int, scratch: Scratch) -> bool:
-    """Return whether a triangle would turn too far in a pose, or lose its area."""
+    """Return whether a triangle would turn too far in a pose, lose its area, or become a sliver at rest."""
     places, place = surface.places, scratch.place
     for i in range(count):
         corners = surface.triangles[scratch.ring[i]]
@@ -586,7 +588,19 @@ def _turns_over(surface: Surface, a: int, b: int, t: float, count: int, scratch:
             before, after = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
             if before > 0.0 and ax * bx + ay * by + az * bz <= MIN_TURN_COSINE * np.sqrt(before * after):
                 return True
+            if k == 0:
+                edge = ex * ex + ey * ey + ez * ez
+                was = np.sqrt(before) / (edge + _square(ux, uy, uz) + _square(ux - ex, uy - ey, uz - ez))
+                now = np.sqrt(after) / (edge + _square(wx, wy, wz) + _square(wx - ex, wy - ey, wz - ez))
+                if now < was and now < MIN_COMPACTNESS / (2 * np.sqrt(3.0)):
+                    return True
     return False
+
+
+@inlined
+def _square(x: float, y: float, z: float) -> float:
+    """Return the squared length of a vector."""
+    return x * x + y * y + z * z
 
 
 @compiled
