@@ -13,27 +13,30 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Intp
 from fba.face._tables import FaceDefMesh, FaceDefTables, interval_lengths
-from fba.face.authoring.regions._eye_opening import CLOSED, LIDS, Profile, measure_profile
+from fba.face.authoring.regions._eye_opening import LIDS, Profile, measure_profile
 from fba.face.authoring.regions._eyes import find_eyes
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion, build_tables, fap_limits, split_by_part, unfold
 from fba.face.authoring.surface._motion_limits import stop_at_folds
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface
-from fba.face.checks._fap_checks import CORNER_RADIUS, EYE_CORNERS, HAIR, TURNING
+from fba.face.checks._fap_checks import CORNER_RADIUS, EYE_CORNERS, HAIR, TURNING, region_table
 from fba.face.model import FaceModel, Part
 from fba.mesh.simplify import Level, part_starts, place_on_level
+from fba.parameters import faps, point_rows
 
 SMOOTHING = 0.3
 """Weight of the interpolated motion of a vertex compared to that of each vertex that it stands for."""
 LEAST_MOTION = 1e-3
 """Motions below this share of the largest of a FAP are left out of its table."""
-MOST_CUT = 0.006
+MOST_CUT = 0.002
 """Depth to which the middles of a closing lid's triangles may cut the eyeball, as a share of its radius."""
 OUTSIDE_RADII = 0.97
 """Triangles whose corners at rest are this far out, in radii of the eyeball, may not cut it."""
-LIFTS = 12
+LIFTS = 30
 """Rounds in which lids are lifted off the eyeball: lifting one triangle tilts its neighbours."""
+ROUNDS = 4
+"""Rounds in which lids are lifted off the eyeball and folds taken out of them."""
 SAMPLES = np.array([(0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3), (1, 0, 0)])
 """Places on a triangle that are kept out of the eyeball, as weights of its corners."""
 
@@ -121,6 +124,8 @@ class _Easing:
         mesh: of the full face. unit: metres a step.
         """
         part = self._face.part(mesh.part)
+        if part.kind != "eye":
+            moves[self._outside(fap)] = 0.0
         if fap not in LIDS or part.kind != "skin":
             eased = None if part.kind in HAIR else self._unfolded(fap, part, mesh.borders, moves, unit)
         else:
@@ -133,6 +138,16 @@ class _Easing:
         surface, _ = self._of(part)
         made = build_tables(fap, unit, split_by_part(surface, eased)).meshes
         return made[0] if made else None
+
+    def _outside(self, fap: int) -> Bool:
+        """Return (P,) mask of the points outside the region of a FAP."""
+        names, reach = region_table().get(fap, ((), np.inf))
+        points = self._face.points[[point_rows()[name] for name in names]]
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
+            return np.zeros(len(self._fit.places), dtype=bool)
+        away = np.linalg.norm(self._fit.places[:, None] - points, axis=2).min(axis=1)
+        return np.asarray(away > reach * self._face.fapu.ES * 1024)
 
     def _of(self, part: Part) -> tuple[Surface, Limiter]:
         """Return the triangles of a part, of the level's points, and what limits their motions."""
@@ -160,24 +175,51 @@ class _Easing:
         """Return the motion without folds; None where there are none."""
         surface, limiter = self._of(part)
         motion, turning = self._motion(fap, borders, moves, unit), fap in TURNING
-        patch = limiter.patch(motion.vertices)
-        if all(patch.is_sound(limiter.spread(motion.vertices, shift), turning=turning) for shift in motion.shifts):
+        if _is_sound(limiter, motion, turning):
             return None
-        motion = unfold(surface, limiter, motion, surface.mask(self._fit.fixed), turning)
+        own = self._fit.fixed if part.kind == "eye" else self._own_points(fap)
+        motion = self._unfold(surface, limiter, motion, own, fap)
         return stop_at_folds(limiter, motion, turning=turning)
+
+    def _unfold(self, surface: Surface, limiter: Limiter, motion: Motion, own: Intp, fap: int) -> Motion:
+        """Return the motion with folds stretched evenly; where need be, of all points but the FAP's own (M,)."""
+        outside = self._outside(fap)
+        for pinned in (self._fit.fixed, own):
+            eased = unfold(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
+            if _is_sound(limiter, eased, fap in TURNING):
+                break
+        return eased
+
+    def _own_points(self, fap: int) -> Intp:
+        """Return the points whose motion tells whether a FAP is right: its own and its mate's."""
+        mate = faps()[fap - 1].left_right_mate
+        names = {name for each in (fap, mate) if each for name in faps()[each - 1].feature_points}
+        bound = self._face.bound[[point_rows()[name] for name in sorted(names)]]
+        return self._fit.point[bound[bound >= 0]]
 
     def _lids(self, fap: int, part: Part, borders: Int32, moves: Float64, unit: float) -> Motion | None:
         """Return the motion of a lid, in front of the eyeball and without folds but at the eye's corners."""
         surface, limiter = self._of(part)
         side = LIDS[fap][0]
         eye = find_eyes(self._marks, self._face.parts)[side]
+        limiter = limiter.without(self._corners(side))
+        own = self._margins(side)
         motion = self._motion(fap, borders, moves, unit)
-        pinned = surface.mask(self._fit.fixed)
-        motion = unfold(surface, limiter, motion, pinned, True)
+        motion = self._unfold(surface, limiter, motion, own, fap)
         if eye.measured and not eye.flat:
             profile = measure_profile(eye, self._face.parts, 0.0)
-            motion = lift_off(profile, surface, motion, pinned)
-        return stop_at_folds(limiter.without(self._corners(side)), motion, turning=True)
+            for _ in range(ROUNDS):
+                motion = lift_off(profile, surface, motion, surface.mask(own))
+                if _is_sound(limiter, motion, True):
+                    break
+                motion = self._unfold(surface, limiter, motion, own, fap)
+        return stop_at_folds(limiter, motion, turning=True)
+
+    def _margins(self, side: str) -> Intp:
+        """Return the points on the margins of an eye's lids."""
+        surface = self._marks.surface
+        lines = np.concatenate([self._marks.contour(f"{side} {lid} lid") for lid in ("upper", "lower")])
+        return np.unique(self._fit.point[surface.pool[np.isin(surface.number, lines)]])
 
     @cached_property
     def _marks(self) -> Landmarks:
@@ -190,6 +232,11 @@ class _Easing:
         ends = np.array([self._marks.point(name) for name in names])
         away = np.linalg.norm(self._fit.places[:, None] - ends, axis=2).min(axis=1)
         return np.flatnonzero(away < CORNER_RADIUS * np.linalg.norm(ends[0] - ends[1]))
+
+
+def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:
+    patch = limiter.patch(motion.vertices)
+    return all(patch.is_sound(limiter.spread(motion.vertices, shift), turning=turning) for shift in motion.shifts)
 
 
 def lift_off(profile: Profile, surface: Surface, motion: Motion, margins: Bool) -> Motion:
