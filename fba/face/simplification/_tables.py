@@ -163,8 +163,7 @@ class _Easing:
     def _motion(self, fap: int, borders: Int32, moves: Float64, unit: float) -> Motion:
         """Return displacements (P, K - 1, 3) as shifts over the range of a FAP."""
         low, high = fap_limits(fap)
-        inner = borders[1:-1].astype(np.float64)
-        values = np.unique(np.concatenate([[min(low, *inner, 0), 0.0, max(high, *inner, 0)], inner]))
+        values = np.unique(np.clip([low, 0.0, high, *borders[1:-1]], low, high))
         ways = np.array([interval_lengths(borders, float(value)) for value in values], dtype=np.float64)
         moving = np.flatnonzero(moves.any(axis=(1, 2)))
         return Motion(values, moving, unit * np.einsum("ki,pid->kpd", ways, moves[moving]))
