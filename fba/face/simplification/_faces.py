@@ -47,18 +47,24 @@ POSES: tuple[dict[int, int], ...] = (
 broad grin, the lips apart with wide eyes, and the lips pushed forward with raised cheeks."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-IMPORTANCE = 300.0
+IMPORTANCE = 60.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
-LID_MARGINS = tuple(f"{side} {lid} lid" for side in ("left", "right") for lid in ("upper", "lower"))
+LINES = ("left upper lid", "left lower lid", "right upper lid", "right lower lid", "upper inner lip",
+         "lower inner lip")  # fmt: skip
+"""Contours that stay lines of the mesh: what meets there must meet on coarse faces too."""
 LID_SHARE = 4.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
-LASH_SHARE = 0.2
+LASH_SHARE = 0.4
 """The same for lashes: a hair has little area, yet its lack is seen."""
-TEETH_SHARE = 0.5
+TEETH_SHARE = 0.3
 """The same for teeth, which stand out against the dark behind them."""
+TONGUE_SHARE = 0.2
+"""The same for the tongue, which bends."""
+OTHER_SHARE = 0.2
+"""The same for clothes and what else is worn."""
 RIM_VERTICES = 16
 """Vertices of a pupil's rim that stay."""
 LEVEL_RATIO = 0.32
@@ -212,10 +218,10 @@ def _find_pinned(model: FaceModel) -> Bool:
 
 
 def _find_lines(model: FaceModel) -> Int32:
-    """Return (V,): a bit for each margin of a lid that a vertex is on."""
+    """Return (V,): a bit for each of `LINES` that a vertex is on."""
     marks = find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
     lines = np.zeros(len(model.vertices), dtype=np.int32)
-    for bit, name in enumerate(LID_MARGINS):
+    for bit, name in enumerate(LINES):
         lines[marks.surface.pool[np.isin(marks.surface.number, marks.contour(name))]] |= 1 << bit
     return lines
 
@@ -232,7 +238,13 @@ def _importance(model: FaceModel) -> Float64:
             rows = mesh.vertices + model.starts[mesh.part]
             most = max(float(moved.max()), 1e-30) / (LID_SHARE if table.fap in LID_FAPS else 1.0)
             share[rows] = np.maximum(share[rows], moved / most)
-    for kind, counts in (("eye", EYE_SHARE), ("lash", LASH_SHARE), ("teeth", TEETH_SHARE)):
+    for kind, counts in (
+        ("eye", EYE_SHARE),
+        ("lash", LASH_SHARE),
+        ("teeth", TEETH_SHARE),
+        ("tongue", TONGUE_SHARE),
+        ("other", OTHER_SHARE),
+    ):
         for part in model.of_kind(kind):
             start = model.starts[part.name]
             share[start : start + len(part.vertices)] = counts

@@ -29,8 +29,6 @@ SMOOTHING = 0.3
 """Weight of the interpolated motion of a vertex compared to that of each vertex that it stands for."""
 LEAST_MOTION = 1e-3
 """Motions below this share of the largest of a FAP are left out of its table."""
-MOST_CUT = 0.002
-"""Depth to which the middles of a closing lid's triangles may cut the eyeball, as a share of its radius."""
 OUTSIDE_RADII = 0.97
 """Triangles whose corners at rest are this far out, in radii of the eyeball, may not cut it."""
 LIFTS = 30
@@ -168,9 +166,7 @@ class _Easing:
         moving = np.flatnonzero(moves.any(axis=(1, 2)))
         return Motion(values, moving, unit * np.einsum("ki,pid->kpd", ways, moves[moving]))
 
-    def _unfolded(
-        self, fap: int, part: Part, borders: Int32, moves: Float64, unit: float
-    ) -> Motion | None:
+    def _unfolded(self, fap: int, part: Part, borders: Int32, moves: Float64, unit: float) -> Motion | None:
         """Return the motion without folds; None where there are none."""
         surface, limiter = self._of(part)
         motion, turning = self._motion(fap, borders, moves, unit), fap in TURNING
@@ -208,7 +204,7 @@ class _Easing:
         if eye.measured and not eye.flat:
             profile = measure_profile(eye, self._face.parts, 0.0)
             for _ in range(ROUNDS):
-                motion = lift_off(profile, surface, motion, surface.mask(own))
+                motion = lift_off(profile, surface, motion, surface.mask(own) | self._outside(fap))
                 if _is_sound(limiter, motion, True):
                     break
                 motion = self._unfold(surface, limiter, motion, own, fap)
@@ -235,20 +231,22 @@ class _Easing:
 
 def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:
     patch = limiter.patch(motion.vertices)
-    return all(patch.is_sound(limiter.spread(motion.vertices, shift), turning=turning) for shift in motion.shifts)
+    return all(
+        patch.is_sound(limiter.spread(motion.vertices, shift), turning=turning) for shift in motion.shifts
+    )
 
 
-def lift_off(profile: Profile, surface: Surface, motion: Motion, margins: Bool) -> Motion:
-    """Return the motion of a lid, lifted forwards where its triangles would cut the eyeball.
+def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -> Motion:
+    """Return the motion of a lid, lifted forwards where its triangles would cut the eyeball deeper than before.
 
-    margins: (N,) mask of vertices that stay, as they meet those of the other lid.
+    pinned: (N,) mask of vertices whose shifts must not change, as those of margins, which meet others.
     """
     before = surface.vertices
     moved = surface.mask(motion.vertices)
     outside = profile.is_outside(before, OUTSIDE_RADII)
     triangles = surface.triangles
     triangles = triangles[moved[triangles].any(axis=1) & outside[triangles].all(axis=1)]
-    free = ~margins[triangles]
+    free = ~pinned[triangles]
     was = np.maximum(_depth(profile, before[triangles]), 0.0)
     shifts = np.zeros((len(motion.values), *before.shape))
     shifts[:, motion.vertices] = motion.shifts
@@ -256,7 +254,7 @@ def lift_off(profile: Profile, surface: Surface, motion: Motion, margins: Bool) 
         shift = shifts[k]
         for _ in range(LIFTS):
             now = (before + shift)[triangles]
-            deep = _depth(profile, now) - was - MOST_CUT * profile.size
+            deep = _depth(profile, now) - was
             deep[np.einsum("sk,fkd->fsd", SAMPLES, now)[:, :, 2] < profile.centre[2]] = 0.0
             push = np.maximum(deep.max(axis=1, initial=0.0), 0.0)
             if not push.any():
