@@ -47,13 +47,13 @@ fba.face.learning
 fba.face.gltf
 fba.face.builtin
 fba.face.authoring.surface
-fba.face.simplification
 fba.face.authoring.regions
 fba.face.authoring._author
 fba.face.authoring._shapes
 fba.face.authoring
 fba.face.checks
 fba.face.importers.assembly
+fba.face.simplification
 fba.face.importers.points
 fba.face.importers.makehuman
 fba.face.importers

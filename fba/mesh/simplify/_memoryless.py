@@ -112,13 +112,15 @@ def simplify(
     pinned: Bool | None = None,
     looks: Floating | None = None,
     importance: Floating | None = None,
+    lines: Integer | None = None,
 ) -> Simplification:
     """Return the simplification of a mesh down to a number of triangles, or through several, falling.
 
     poses: (K, N, 3), the vertices in K poses, the first at rest. triangles: (F, 3). pinned: (N,), vertices
     that stay where they are. looks: (N, A), texture coordinates and colours: vertices of one position and
     different looks are a seam, which stays closed; without, or with equal ones, they are one vertex.
-    importance: (N,), factors of the cost around each vertex, 1 by default.
+    importance: (N,), factors of the cost around each vertex, 1 by default. lines: (N,), a bit for each line
+    through a vertex, such as a lid's margin: neighbours of one line collapse along it only.
 
     An edge's cost is the source's (half the squared volumes that the collapse sweeps, half the squared areas
     along borders and seams times the squared length of the edge), summed over the poses, over the area around
@@ -151,9 +153,14 @@ def simplify(
     weight = np.ones(total)
     if importance is not None:
         weight[points] = _per_vertex(importance, count, "importance")
+    through = np.zeros(total, np.int64)
+    if lines is not None:
+        np.bitwise_or.at(through, points, _per_vertex(lines, count, "lines").astype(np.int64))
+        kind[(through > 0) & (kind == loops.ON_LINE)] = loops.PINNED  # where a line meets a border
+        kind[(through > 0) & (kind == loops.FREE)] = loops.ON_LINE
     surface = loops.Surface(
         welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
-        kind, np.zeros(total, np.int64), weight,
+        kind, np.zeros(total, np.int64), weight, through,
     )  # fmt: skip
     number = int(wedges.max(initial=-1)) + 1
     history = loops.History(

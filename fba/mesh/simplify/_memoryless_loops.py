@@ -28,6 +28,8 @@ COSINE = float(np.cos(np.radians(1.0)))
 """Of alpha, the least angle between a plane and those that determine a position already."""
 MIN_TURN_COSINE = 0.2
 """No triangle may turn by more than the angle of this cosine, in any pose."""
+MIN_COMPACTNESS = 0.1
+"""No triangle may become less compact than this, where 1 is that of an equilateral one."""
 FREE, ON_LINE, PINNED = 0, 1, 2
 """Vertices that may move; those on a border or seam, which only collapse along it; those that stay."""
 
@@ -38,6 +40,7 @@ class Surface(NamedTuple):
     places: float64 (V, K, 3), vertices in all poses, at rest first. triangles, wedges: int32 (F, 3), vertices
     and wedges of each corner; the first corner is -1 once the triangle is gone. first, follow: (V,) and
     (3 F,), the corners of each vertex as a linked list. kind: (V,). version: (V,), counts changes nearby.
+    importance: (V,), factors of the cost. lines: (V,), a bit for each line through a vertex that is kept.
     """
 
     places: Float64
@@ -48,6 +51,7 @@ class Surface(NamedTuple):
     kind: Int32
     version: Int64
     importance: Float64
+    lines: Int64
 
 
 class History(NamedTuple):
@@ -117,7 +121,9 @@ def _find_ring(surface: Surface, a: int, b: int, ring: Int32) -> int:
 
 @compiled
 def _is_line(surface: Surface, a: int, b: int) -> bool:
-    """Return whether the edge from a to b belongs to a border, or to a seam whose sides both go on."""
+    """Return whether the edge from a to b belongs to a line, a border, or a seam whose sides both go on."""
+    if surface.lines[a] & surface.lines[b]:
+        return True
     triangles, wedges = surface.triangles, surface.wedges
     count, one, two, other_one, other_two = 0, -1, -1, -1, -1
     c = surface.first[a]
@@ -447,6 +453,88 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
 
 
 @compiled
+def _cuts_line(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
+    """Return whether a way beside a line would be as short as the line when the edge from a to b collapses.
+
+    Such a way is an edge between two of its vertices, or two edges by another one.
+    """
+    lines, places, near = surface.lines, surface.places, scratch.near
+    if lines[a] != lines[b]:
+        for one, other in ((a, b), (b, a)):
+            for i in range(_add_neighbours(surface, one, near, 0)):
+                v = near[i]
+                if v != other and lines[v] & lines[other] & ~lines[one]:
+                    if not (_has_edge(surface, v, other) or _has_edge(surface, other, v)):
+                        return True
+    count = _add_neighbours(surface, b, near, _add_neighbours(surface, a, near, 0))
+    through, place = lines[a] | lines[b], places[a, 0] + scratch.place
+    for i in range(count):
+        v = near[i]
+        for j in range(i):  # two edges by the vertex that is left
+            shared = lines[v] & lines[near[j]] & ~through
+            if shared:
+                way = _distance(places[v, 0], place) + _distance(places[near[j], 0], place)
+                if way < _line_length(surface, v, near[j], shared & -shared, way):
+                    return True
+        if through == 0 or lines[v] & through:
+            continue
+        end = a if lines[a] else b  # two edges from the vertex that is left, which is on a line
+        c = surface.first[v]
+        while c >= 0:
+            for k in range(3):
+                w = surface.triangles[c // 3, k]
+                if surface.triangles[c // 3, 0] >= 0 and w != a and w != b and lines[w] & lines[end]:
+                    shared = lines[w] & lines[end]
+                    way = _distance(places[v, 0], place) + _distance(places[v, 0], places[w, 0])
+                    if way < _line_length(surface, w, end, shared & -shared, way):
+                        return True
+            c = surface.follow[c]
+    return False
+
+
+@inlined
+def _distance(one: Float64, other: Float64) -> float:
+    """Return the distance of two positions (3,)."""
+    return float(np.sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2 + (one[2] - other[2]) ** 2))
+
+
+@compiled
+def _line_length(surface: Surface, start: int, end: int, line: int, most: float) -> float:
+    """Return the length at rest of a line between two of its vertices, or a length of at least `most`."""
+    longest = 0.0
+    for side in range(2):
+        length, before, v = 0.0, -1, start
+        while v >= 0 and v != end and length <= most:
+            w = _next_on_line(surface, v, before, line, side if before < 0 else 0)
+            if w >= 0:
+                length += _distance(surface.places[w, 0], surface.places[v, 0])
+            before, v = v, w
+        if v == end:
+            return length
+        if v >= 0:
+            longest = max(longest, length)
+    return longest
+
+
+@compiled
+def _next_on_line(surface: Surface, v: int, before: int, line: int, skipped: int) -> int:
+    """Return a neighbour of v on a line other than the one before, after so many others; -1 for none."""
+    first = -1
+    c = surface.first[v]
+    while c >= 0:
+        triangle = surface.triangles[c // 3]
+        if triangle[0] >= 0:
+            for k in range(3):
+                w = triangle[k]
+                if w != v and w != before and w != first and surface.lines[w] & line:
+                    if not skipped or first >= 0:
+                        return w
+                    first = w
+        c = surface.follow[c]
+    return -1
+
+
+@compiled
 def _on_border(surface: Surface, v: int) -> bool:
     """Return whether an edge of v belongs to one triangle only: then two corners around it occur once."""
     if surface.kind[v] == FREE:
@@ -471,7 +559,7 @@ def _on_border(surface: Surface, v: int) -> bool:
 
 @compiled
 def _turns_over(surface: Surface, a: int, b: int, t: float, count: int, scratch: Scratch) -> bool:
-    """Return whether a triangle would turn too far in a pose, or lose its area."""
+    """Return whether a triangle would turn too far in a pose, lose its area, or become a sliver at rest."""
     places, place = surface.places, scratch.place
     for i in range(count):
         corners = surface.triangles[scratch.ring[i]]
@@ -500,7 +588,19 @@ def _turns_over(surface: Surface, a: int, b: int, t: float, count: int, scratch:
             before, after = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
             if before > 0.0 and ax * bx + ay * by + az * bz <= MIN_TURN_COSINE * np.sqrt(before * after):
                 return True
+            if k == 0:
+                edge = ex * ex + ey * ey + ez * ez
+                was = np.sqrt(before) / (edge + _square(ux, uy, uz) + _square(ux - ex, uy - ey, uz - ez))
+                now = np.sqrt(after) / (edge + _square(wx, wy, wz) + _square(wx - ex, wy - ey, wz - ez))
+                if now < was and now < MIN_COMPACTNESS / (2 * np.sqrt(3.0)):
+                    return True
     return False
+
+
+@inlined
+def _square(x: float, y: float, z: float) -> float:
+    """Return the squared length of a vector."""
+    return x * x + y * y + z * z
 
 
 @compiled
@@ -542,7 +642,7 @@ def collapse_edges(
                 lost += _corner_of(corners, a) >= 0 and _corner_of(corners, b) >= 0
             if faces - lost < target or _turns_over(surface, a, b, along, count, scratch):
                 continue
-            if not _is_valid(surface, a, b, scratch):
+            if not _is_valid(surface, a, b, scratch) or _cuts_line(surface, a, b, scratch):
                 continue
             kind, other = surface.kind[a], surface.kind[b]
             if other > kind or (other == kind and kind != FREE and along > 0.0):

@@ -1,4 +1,4 @@
-"""Faces with fewer triangles that FAPs still move: simplified with all that they carry.
+"""Simplifies faces, and builds the face of any level of the simplified mesh.
 
 The mesh is simplified by `fba.mesh.simplify` in several poses of the face, so that the lips, the lids and all
 else that moves keep more vertices. Feature points stay where they are. The tables of FAPs are then fitted
@@ -15,21 +15,24 @@ import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError
-from fba.face._tables import FaceDefMesh, FaceDefTables, interval_lengths
+from fba.face.authoring import author
 from fba.face.authoring.surface.landmarks import find_landmarks, weld_skin
+from fba.face.checks._fap_checks import count_errors
+from fba.face.checks._posing import Poser
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
+from fba.face.importers.assembly._repair import repair_tables
 from fba.face.model import DetailLevel, FaceModel, shape_key
+from fba.face.simplification._tables import fit_tables
 from fba.mesh.simplify import (
     Level,
     Simplification,
     carry_parts,
     part_looks,
-    part_starts,
     place_on_level,
     simplify,
 )
-from fba.parameters import FAP_COUNT, faps
+from fba.parameters import FAP_COUNT
 
 POSES: tuple[dict[int, int], ...] = (
     {},
@@ -44,32 +47,26 @@ POSES: tuple[dict[int, int], ...] = (
 broad grin, the lips apart with wide eyes, and the lips pushed forward with raised cheeks."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-TURNING_FAPS = (3, 19, 20, 21, 22, 47)
-"""FAPs that rotate what they move: jaw, lids and the rolled tongue. A triangle may face another way then."""
-IMPORTANCE = 300.0
+IMPORTANCE = 60.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
-LID_MARGINS = tuple(f"{side} {lid} lid" for side in ("left", "right") for lid in ("upper", "lower"))
-MARGIN_SHARE = 0.5
-"""The vertices of the margins of the lids stay while at least this share of the triangles is left."""
+LINES = ("left upper lid", "left lower lid", "right upper lid", "right lower lid", "upper inner lip",
+         "lower inner lip")  # fmt: skip
+"""Contours that stay lines of the mesh: what meets there must meet on coarse faces too."""
 LID_SHARE = 4.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
-LASH_SHARE = 0.2
+LASH_SHARE = 0.4
 """The same for lashes: a hair has little area, yet its lack is seen."""
-TEETH_SHARE = 0.5
+TEETH_SHARE = 0.3
 """The same for teeth, which stand out against the dark behind them."""
-SMOOTHING = 0.3
-"""Weight of the interpolated motion of a vertex compared to that of each vertex that it stands for."""
-LEAST_AREA = 0.1
-"""Share of its area that a triangle keeps, seen along its neutral normal, where FAPs are at their limits."""
-MAX_ROUNDS = 150
-"""Rounds in which the motion of triangles that turn over is smoothed."""
+TONGUE_SHARE = 0.2
+"""The same for the tongue, which bends."""
+OTHER_SHARE = 0.2
+"""The same for clothes and what else is worn."""
 RIM_VERTICES = 16
 """Vertices of a pupil's rim that stay."""
-LEAST_MOTION = 1e-3
-"""Motions below this share of the largest of a FAP are left out of its table."""
 LEVEL_RATIO = 0.32
 """Triangles of a level of detail by those of the next finer one: the source's 680 of 2141."""
 LEAST_PER_PART = 50
@@ -118,15 +115,17 @@ class FaceSimplification:
     def build(self, level: Level, *, tables: bool = True) -> DetailLevel:
         """Return the face of a level of the mesh, with all that it carries. tables: whether with those."""
         model = self.model
-        parts = tuple(replace(part, **arrays) for part, _, arrays in carry_parts(model, level))
-        bound = np.where((model.bound >= 0) & self._used[model.bound], level.parents[model.bound], -1)
-        face = replace(
-            model,
-            parts=parts,
-            bound=bound.astype(np.int32),
-            tables=_fit_tables(model, level, self._pinned, self.mesh.positions) if tables else (),
-            levels=(),
+        on_full = level.carry(self.mesh.positions).astype(np.float32)
+        parts = tuple(
+            # corners of eyeballs are on their spheres, as lids pass close to these
+            replace(part, **(arrays | ({"vertices": on_full[rows]} if part.kind == "eye" else {})))
+            for part, rows, arrays in carry_parts(model, level)
         )
+        bound = np.where((model.bound >= 0) & self._used[model.bound], level.parents[model.bound], -1)
+        face = replace(model, parts=parts, bound=bound.astype(np.int32), tables=(), levels=())
+        if tables:
+            fitted = fit_tables(model, face, level, self._unmoved(level), self.mesh.positions)
+            face = (lambda f: f)(replace(face, tables=fitted))
         return DetailLevel(
             face, level.parents, max(self._errors(level, _root_mean_square)), shape_key(model.parts)
         )
@@ -137,10 +136,10 @@ class FaceSimplification:
         used[self.model.triangles] = True
         return used
 
-    @cached_property
-    def _pinned(self) -> Int32:
-        """Vertices that stay, which move exactly as they do on the full face."""
-        return np.flatnonzero(self._kept & self._used).astype(np.int32)
+    def _unmoved(self, level: Level) -> Int32:
+        """Return vertices that are still where they were because they had to; they move exactly as before."""
+        still = (level.positions[level.parents] == self.mesh.positions).all(axis=1)
+        return np.flatnonzero(self._kept & still & self._used).astype(np.int32)
 
 
 def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplification:
@@ -160,7 +159,7 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         )
     deformer = Deformer(model)
     poses = np.stack([deformer.local(_values(pose)) for pose in POSES]).astype(np.float64)
-    kept = _find_pinned(model, margins=fewest >= MARGIN_SHARE * len(model.triangles))
+    kept, lines = _find_pinned(model), _find_lines(model)
     mesh = simplify(
         poses,
         model.triangles,
@@ -168,8 +167,17 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         pinned=kept,
         looks=part_looks(model),
         importance=_importance(model),
+        lines=lines,
     )
-    return FaceSimplification(model, mesh, poses, kept)
+    return FaceSimplification(model, mesh, poses, kept | (lines > 0))
+
+
+def _mend(face: FaceModel) -> FaceModel:
+    """Return the face with sound tables for FAPs whose own break rules, from the mesh alone if need be."""
+    if not count_errors(Poser(face), [table.fap for table in face.tables]):
+        return face
+    plain = author(face.parts, face.points, bound=face.bound)
+    return repair_tables(face, plain)
 
 
 def level_sizes(model: FaceModel, count: int) -> list[int]:
@@ -193,17 +201,11 @@ def _values(pose: dict[int, int]) -> Float32:
     return values
 
 
-def _find_pinned(model: FaceModel, *, margins: bool) -> Bool:
-    """Return (V,): vertices of feature points, and some around each pupil, which give its size. margins:
-    whether also those of the margins of the lids."""
+def _find_pinned(model: FaceModel) -> Bool:
+    """Return (V,): vertices of feature points, and some around each pupil, which give its size."""
     pinned = np.zeros(len(model.vertices), dtype=bool)
     pinned[model.bound[model.bound >= 0]] = True
     eyes = {part.name for part in model.of_kind("eye")}
-    if margins:
-        marks = find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
-        for name in LID_MARGINS:
-            margin = np.isin(marks.surface.number, marks.contour(name))
-            pinned[marks.surface.pool[margin]] = True
     for fap in PUPIL_FAP.values():
         for mesh in model.table_of[fap].meshes if fap in model.table_of else ():
             size = np.linalg.norm(mesh.displacements, axis=2).max(axis=1, initial=0.0)
@@ -213,6 +215,15 @@ def _find_pinned(model: FaceModel, *, margins: bool) -> Bool:
                 around = np.argsort(np.arctan2(off[:, 1], off[:, 0]))
                 pinned[rim[around[:: -(-len(rim) // RIM_VERTICES)]]] = True
     return pinned
+
+
+def _find_lines(model: FaceModel) -> Int32:
+    """Return (V,): a bit for each of `LINES` that a vertex is on."""
+    marks = find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
+    lines = np.zeros(len(model.vertices), dtype=np.int32)
+    for bit, name in enumerate(LINES):
+        lines[marks.surface.pool[np.isin(marks.surface.number, marks.contour(name))]] |= 1 << bit
+    return lines
 
 
 def _importance(model: FaceModel) -> Float64:
@@ -227,107 +238,14 @@ def _importance(model: FaceModel) -> Float64:
             rows = mesh.vertices + model.starts[mesh.part]
             most = max(float(moved.max()), 1e-30) / (LID_SHARE if table.fap in LID_FAPS else 1.0)
             share[rows] = np.maximum(share[rows], moved / most)
-    for kind, counts in (("eye", EYE_SHARE), ("lash", LASH_SHARE), ("teeth", TEETH_SHARE)):
+    for kind, counts in (
+        ("eye", EYE_SHARE),
+        ("lash", LASH_SHARE),
+        ("teeth", TEETH_SHARE),
+        ("tongue", TONGUE_SHARE),
+        ("other", OTHER_SHARE),
+    ):
         for part in model.of_kind(kind):
             start = model.starts[part.name]
             share[start : start + len(part.vertices)] = counts
     return 1.0 + IMPORTANCE * share**2
-
-
-def _fit_tables(
-    model: FaceModel, level: Level, pinned: Int32, positions: Float64
-) -> tuple[FaceDefTables, ...]:
-    """Return the tables with which a level moves most like the full face, by least squares.
-
-    Each vertex of the full face should be where the level's triangle carries it; those of feature points are
-    moved exactly. A little of the interpolated motion makes up for vertices that stand for few.
-    """
-    from scipy.sparse import coo_array, eye_array
-    from scipy.sparse.linalg import splu
-
-    starts = part_starts(model, level)
-    point = np.unique(level.points, return_inverse=True)[1].astype(np.int32)
-    count, total = int(point.max()) + 1, len(positions)
-    placed, weights = place_on_level(positions, level)
-    across = np.repeat(np.arange(total), 3)
-    spread = coo_array((weights.ravel(), (across, point[placed].ravel())), shape=(total, count)).tocsr()
-    first = np.unique(point, return_index=True)[1]  # one side of each seam
-    places = level.positions[first]
-    down = np.repeat(np.arange(count), 3)
-    carried = coo_array(
-        (level.weights[first].ravel(), (down, level.rows[first].ravel())), shape=(count, total)
-    ).tocsr()
-    fixed = point[level.parents[pinned]]
-    free = np.setdiff1d(np.arange(count), fixed)
-    normal = (spread.T @ spread + SMOOTHING * eye_array(count)).tocsr()
-    solver = splu(normal[free][:, free].tocsc()) if len(free) else None
-    corners = point[level.triangles]
-    tables = []
-    for table in model.tables:
-        meshes = []
-        for mesh in table.meshes:
-            intervals = len(mesh.borders) - 1
-            moves = np.zeros((total, 3 * intervals))
-            moves[mesh.vertices + model.starts[mesh.part]] = mesh.displacements.reshape(-1, 3 * intervals)
-            near = carried @ moves
-            fitted = np.zeros_like(near)
-            fitted[fixed] = moves[pinned]
-            if solver is not None:
-                right = spread.T @ moves + SMOOTHING * near
-                fitted[free] = solver.solve(right[free] - normal[free][:, fixed] @ fitted[fixed])
-            fitted[~near.any(axis=1)] = 0.0  # what the full face does not move there
-            part = [one.name for one in model.parts].index(mesh.part)
-            rows = slice(starts[part], starts[part + 1])
-            own = np.isin(level.triangles[:, 0], np.arange(rows.start, rows.stop))
-            fitted = fitted.reshape(count, intervals, 3)
-            size = np.abs(fitted).max(axis=(1, 2), initial=0.0)
-            fitted[size <= LEAST_MOTION * size.max(initial=0.0)] = 0.0
-            if table.fap not in TURNING_FAPS:
-                _unfold(fitted, _limits(model, table.fap, mesh), places, corners[own], fixed)
-            here = fitted[point[rows]]
-            moved = np.flatnonzero(here.any(axis=(1, 2))).astype(np.int32)
-            meshes.append(FaceDefMesh(mesh.part, mesh.borders, moved, here[moved]))
-        tables.append(replace(table, meshes=tuple(meshes)))
-    return tuple(tables)
-
-
-def _limits(model: FaceModel, fap: int, mesh: FaceDefMesh) -> Float64:
-    """Return (L, K - 1): how far a FAP goes along each interval at the ends of its range, times FAPU."""
-    entry = faps()[fap - 1]
-    ends = [limit * entry.step for limit in entry.i_limits or () if limit]
-    lengths = [interval_lengths(mesh.borders, float(value)) for value in ends]
-    return np.array(lengths, dtype=np.float64).reshape(-1, len(mesh.borders) - 1) * model.fapu.of_fap(fap)
-
-
-def _unfold(moves: Float64, limits: Float64, places: Float64, corners: Int32, fixed: Int32) -> None:
-    """Even out motions (P, K - 1, 3), in place, that turn triangles over at a FAP's limits (L, K - 1).
-
-    places: (P, 3), at rest. corners: (F, 3). fixed: points whose motion stays. What is left folded after
-    `MAX_ROUNDS` stays so.
-    """
-    moving: Bool = np.abs(moves).max(axis=(1, 2), initial=0.0) > 0
-    corners = corners[moving[corners].any(axis=1)]
-    before = _normals(places, corners)
-    square = (before**2).sum(axis=1)
-    kept = moves[fixed].copy()
-    for _ in range(MAX_ROUNDS):
-        over = np.zeros(len(corners), dtype=bool)
-        for limit in limits:
-            after = _normals(places + np.einsum("k,pkd->pd", limit, moves), corners)
-            over |= (before * after).sum(axis=1) < LEAST_AREA * square
-        if not over.any():
-            return
-        # each triangle that turns over moves more like one piece
-        sums, counts = np.zeros_like(moves), np.zeros(len(places))
-        means = moves[corners[over]].mean(axis=1)
-        for k in range(3):
-            np.add.at(sums, corners[over, k], means)
-            np.add.at(counts, corners[over, k], 1.0)
-        chosen = counts > 0
-        moves[chosen] += 0.7 * (sums[chosen] / counts[chosen, None, None] - moves[chosen])
-        moves[fixed] = kept
-
-
-def _normals(places: Float64, corners: Int32) -> Float64:
-    a, b, c = (places[corners[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)

@@ -1,0 +1,273 @@
+"""The tables of simplified faces: fitted to the full face's by least squares, then made sound.
+
+A motion that turns triangles over is stretched evenly around them, and stops where that does not help. Lids
+pass in front of the eyeball with the middles of their triangles too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from fba.arrays import Bool, Float64, Int32, Intp
+from fba.face._tables import FaceDefMesh, FaceDefTables, interval_lengths
+from fba.face.authoring.regions._eye_opening import LIDS, Profile, measure_profile
+from fba.face.authoring.regions._eyes import find_eyes
+from fba.face.authoring.surface._fold_limits import Limiter
+from fba.face.authoring.surface._motion import Motion, build_tables, fap_limits, split_by_part, unfold
+from fba.face.authoring.surface._motion_limits import stop_at_folds
+from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
+from fba.face.authoring.surface.surface import Surface
+from fba.face.checks._fap_checks import CORNER_RADIUS, EYE_CORNERS, HAIR, TURNING, region_table
+from fba.face.model import FaceModel, Part
+from fba.mesh.simplify import Level, part_starts, place_on_level
+from fba.parameters import faps, point_rows
+
+SMOOTHING = 0.3
+"""Weight of the interpolated motion of a vertex compared to that of each vertex that it stands for."""
+LEAST_MOTION = 1e-3
+"""Motions below this share of the largest of a FAP are left out of its table."""
+OUTSIDE_RADII = 0.97
+"""Triangles whose corners at rest are this far out, in radii of the eyeball, may not cut it."""
+LIFTS = 30
+"""Rounds in which lids are lifted off the eyeball: lifting one triangle tilts its neighbours."""
+ROUNDS = 4
+"""Rounds in which lids are lifted off the eyeball and folds taken out of them."""
+SAMPLES = np.array([(0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3), (1, 0, 0)])
+"""Places on a triangle that are kept out of the eyeball, as weights of its corners."""
+
+
+def fit_tables(
+    model: FaceModel, face: FaceModel, level: Level, still: Int32, positions: Float64
+) -> tuple[FaceDefTables, ...]:
+    """Return the tables with which a level moves most like the full face.
+
+    model: the full face. face: that of the level, without tables. still: vertices of the full one that are
+    still at their places; they move exactly as before, unless that turns a triangle over. positions: (N, 3),
+    of the full one.
+    """
+    fit = _Fit(model, level, still, positions)
+    easing = _Easing(face, fit)
+    tables = []
+    for table in model.tables:
+        unit = face.fapu.of_fap(table.fap)
+        meshes = [
+            easing.ease(table.fap, mesh, fit.motion(mesh, model.starts[mesh.part]), unit)
+            for mesh in table.meshes
+        ]
+        tables.append(replace(table, meshes=tuple(mesh for mesh in meshes if mesh is not None)))
+    return tuple(tables)
+
+
+class _Fit:
+    """Motions of a level's points by least squares: each vertex of the full face should be where the level's
+    triangle carries it. A little of the interpolated motion makes up for points that stand for few.
+
+    point: (M,), the point of each vertex of the level, of P. places: (P, 3). fixed: points whose motion is
+    that of `still`. starts: the first vertex of each part.
+    """
+
+    def __init__(self, model: FaceModel, level: Level, still: Int32, positions: Float64) -> None:
+        from scipy.sparse import coo_array, eye_array
+        from scipy.sparse.linalg import splu
+
+        self.starts = part_starts(model, level)
+        self.point = np.unique(level.points, return_inverse=True)[1].astype(np.intp)
+        count, self._total = int(self.point.max()) + 1, len(positions)
+        placed, weights = place_on_level(positions, level)
+        across = np.repeat(np.arange(self._total), 3)
+        where = (across, self.point[placed].ravel())
+        self._spread = coo_array((weights.ravel(), where), shape=(self._total, count)).tocsr()
+        first = np.unique(self.point, return_index=True)[1]  # one side of each seam
+        self.places = level.positions[first]
+        down = np.repeat(np.arange(count), 3)
+        where = (down, level.rows[first].ravel())
+        self._carried = coo_array((level.weights[first].ravel(), where), shape=(count, self._total)).tocsr()
+        self._still, self.fixed = still, self.point[level.parents[still]]
+        self._free = np.setdiff1d(np.arange(count), self.fixed)
+        normal = (self._spread.T @ self._spread + SMOOTHING * eye_array(count)).tocsr()
+        self._beside = normal[self._free][:, self.fixed]
+        self._solver = splu(normal[self._free][:, self._free].tocsc()) if len(self._free) else None
+
+    def motion(self, mesh: FaceDefMesh, start: int) -> Float64:
+        """Return (P, K - 1, 3) the displacements of a mesh whose part begins at the full face's `start`."""
+        intervals = len(mesh.borders) - 1
+        moves = np.zeros((self._total, 3 * intervals))
+        moves[mesh.vertices + start] = mesh.displacements.reshape(-1, 3 * intervals)
+        near = self._carried @ moves
+        fitted = np.zeros_like(near)
+        fitted[self.fixed] = moves[self._still]
+        if self._solver is not None:
+            right = self._spread.T @ moves + SMOOTHING * near
+            fitted[self._free] = self._solver.solve(right[self._free] - self._beside @ fitted[self.fixed])
+        fitted[~near.any(axis=1)] = 0.0  # what the full face does not move there
+        fitted = fitted.reshape(-1, intervals, 3)
+        size = np.abs(fitted).max(axis=(1, 2), initial=0.0)
+        fitted[size <= LEAST_MOTION * size.max(initial=0.0)] = 0.0
+        return np.asarray(fitted)
+
+
+class _Easing:
+    """Makes motions of a simplified face sound."""
+
+    def __init__(self, face: FaceModel, fit: _Fit) -> None:
+        self._face, self._fit = face, fit
+        self._parts: dict[str, tuple[Surface, Limiter]] = {}
+
+    def ease(self, fap: int, mesh: FaceDefMesh, moves: Float64, unit: float) -> FaceDefMesh | None:
+        """Return the mesh of a FAP's table with sound motions like those (P, K - 1, 3) given, None for none.
+
+        mesh: of the full face. unit: metres a step.
+        """
+        part = self._face.part(mesh.part)
+        if part.kind != "eye":
+            moves[self._outside(fap)] = 0.0
+        if fap not in LIDS or part.kind != "skin":
+            eased = None if part.kind in HAIR else self._unfolded(fap, part, mesh.borders, moves, unit)
+        else:
+            eased = self._lids(fap, part, mesh.borders, moves, unit)
+        if eased is None:  # sound as it is
+            row = [one.name for one in self._face.parts].index(part.name)
+            here = moves[self._fit.point[self._fit.starts[row] : self._fit.starts[row + 1]]]
+            moved = np.flatnonzero(here.any(axis=(1, 2))).astype(np.int32)
+            return FaceDefMesh(part.name, mesh.borders, moved, here[moved].astype(np.float32))
+        surface, _ = self._of(part)
+        made = build_tables(fap, unit, split_by_part(surface, eased)).meshes
+        return made[0] if made else None
+
+    def _outside(self, fap: int) -> Bool:
+        """Return (P,) mask of the points outside the region of a FAP."""
+        names, reach = region_table().get(fap, ((), np.inf))
+        points = self._face.points[[point_rows()[name] for name in names]]
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
+            return np.zeros(len(self._fit.places), dtype=bool)
+        away = np.linalg.norm(self._fit.places[:, None] - points, axis=2).min(axis=1)
+        return np.asarray(away > reach * self._face.fapu.ES * 1024)
+
+    def _of(self, part: Part) -> tuple[Surface, Limiter]:
+        """Return the triangles of a part, of the level's points, and what limits their motions."""
+        if part.name not in self._parts:
+            row = [one.name for one in self._face.parts].index(part.name)
+            own = np.arange(self._fit.starts[row], self._fit.starts[row + 1])
+            number = self._fit.point[own]
+            triangles = number[part.triangles]
+            surface = Surface(self._fit.places, triangles, own, number, {part.name: number})
+            self._parts[part.name] = (surface, Limiter.from_mesh(surface.vertices, triangles))
+        return self._parts[part.name]
+
+    def _motion(self, fap: int, borders: Int32, moves: Float64, unit: float) -> Motion:
+        """Return displacements (P, K - 1, 3) as shifts over the range of a FAP."""
+        low, high = fap_limits(fap)
+        values = np.unique(np.clip([low, 0.0, high, *borders[1:-1]], low, high))
+        ways = np.array([interval_lengths(borders, float(value)) for value in values], dtype=np.float64)
+        moving = np.flatnonzero(moves.any(axis=(1, 2)))
+        return Motion(values, moving, unit * np.einsum("ki,pid->kpd", ways, moves[moving]))
+
+    def _unfolded(self, fap: int, part: Part, borders: Int32, moves: Float64, unit: float) -> Motion | None:
+        """Return the motion without folds; None where there are none."""
+        surface, limiter = self._of(part)
+        motion, turning = self._motion(fap, borders, moves, unit), fap in TURNING
+        if _is_sound(limiter, motion, turning):
+            return None
+        own = self._fit.fixed if part.kind == "eye" else self._own_points(fap)
+        motion = self._unfold(surface, limiter, motion, own, fap)
+        return stop_at_folds(limiter, motion, turning=turning)
+
+    def _unfold(self, surface: Surface, limiter: Limiter, motion: Motion, own: Intp, fap: int) -> Motion:
+        """Return the motion with folds stretched evenly; where need be, of all points but the FAP's own (M,)."""
+        outside = self._outside(fap)
+        for pinned in (self._fit.fixed, own):
+            eased = unfold(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
+            if _is_sound(limiter, eased, fap in TURNING):
+                break
+        return eased
+
+    def _own_points(self, fap: int) -> Intp:
+        """Return the points whose motion tells whether a FAP is right: its own and its mate's."""
+        mate = faps()[fap - 1].left_right_mate
+        names = {name for each in (fap, mate) if each for name in faps()[each - 1].feature_points}
+        bound = self._face.bound[[point_rows()[name] for name in sorted(names)]]
+        return self._fit.point[bound[bound >= 0]]
+
+    def _lids(self, fap: int, part: Part, borders: Int32, moves: Float64, unit: float) -> Motion | None:
+        """Return the motion of a lid, in front of the eyeball and without folds but at the eye's corners."""
+        surface, limiter = self._of(part)
+        side = LIDS[fap][0]
+        eye = find_eyes(self._marks, self._face.parts)[side]
+        limiter = limiter.without(self._corners(side))
+        own = self._margins(side)
+        motion = self._motion(fap, borders, moves, unit)
+        motion = self._unfold(surface, limiter, motion, own, fap)
+        if eye.measured and not eye.flat:
+            profile = measure_profile(eye, self._face.parts, 0.0)
+            for _ in range(ROUNDS):
+                motion = lift_off(profile, surface, motion, surface.mask(own) | self._outside(fap))
+                if _is_sound(limiter, motion, True):
+                    break
+                motion = self._unfold(surface, limiter, motion, own, fap)
+        return stop_at_folds(limiter, motion, turning=True)
+
+    def _margins(self, side: str) -> Intp:
+        """Return the points on the margins of an eye's lids."""
+        surface = self._marks.surface
+        lines = np.concatenate([self._marks.contour(f"{side} {lid} lid") for lid in ("upper", "lower")])
+        return np.unique(self._fit.point[surface.pool[np.isin(surface.number, lines)]])
+
+    @cached_property
+    def _marks(self) -> Landmarks:
+        face = self._face
+        return find_landmarks(weld_skin(face.parts, face.bound), face.points, face.bound)
+
+    def _corners(self, side: str) -> Intp:
+        """Return the points about an eye's corners, where skin folds."""
+        names = EYE_CORNERS[:2] if side == "left" else EYE_CORNERS[2:]
+        ends = np.array([self._marks.point(name) for name in names])
+        away = np.linalg.norm(self._fit.places[:, None] - ends, axis=2).min(axis=1)
+        return np.flatnonzero(away < CORNER_RADIUS * np.linalg.norm(ends[0] - ends[1]))
+
+
+def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:
+    patch = limiter.patch(motion.vertices)
+    return all(
+        patch.is_sound(limiter.spread(motion.vertices, shift), turning=turning) for shift in motion.shifts
+    )
+
+
+def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -> Motion:
+    """Return the motion of a lid, lifted forwards where its triangles would cut the eyeball deeper than before.
+
+    pinned: (N,) mask of vertices whose shifts must not change, as those of margins, which meet others.
+    """
+    before = surface.vertices
+    moved = surface.mask(motion.vertices)
+    outside = profile.is_outside(before, OUTSIDE_RADII)
+    triangles = surface.triangles
+    triangles = triangles[moved[triangles].any(axis=1) & outside[triangles].all(axis=1)]
+    free = ~pinned[triangles]
+    was = np.maximum(_depth(profile, before[triangles]), 0.0)
+    shifts = np.zeros((len(motion.values), *before.shape))
+    shifts[:, motion.vertices] = motion.shifts
+    for k in np.flatnonzero(motion.values > 0):
+        shift = shifts[k]
+        for _ in range(LIFTS):
+            now = (before + shift)[triangles]
+            deep = _depth(profile, now) - was
+            deep[np.einsum("sk,fkd->fsd", SAMPLES, now)[:, :, 2] < profile.centre[2]] = 0.0
+            push = np.maximum(deep.max(axis=1, initial=0.0), 0.0)
+            if not push.any():
+                break
+            lift = np.zeros(len(before))
+            np.maximum.at(lift, triangles[free], np.repeat(push[:, None], 3, axis=1)[free])
+            shift[:, 2] += lift
+    vertices = np.flatnonzero(shifts.any(axis=(0, 2)))
+    return Motion(motion.values, vertices, shifts[:, vertices])
+
+
+def _depth(profile: Profile, corners: Float64) -> Float64:
+    """Return (F, S) metres below the eyeball's surface of the samples of triangles (F, 3, 3)."""
+    places = np.einsum("sk,fkd->fsd", SAMPLES, corners).reshape(-1, 3)
+    depth = profile.radius(places, around=False) - np.linalg.norm(places - profile.centre, axis=1)
+    return np.asarray(depth.reshape(len(corners), len(SAMPLES)))
