@@ -211,22 +211,52 @@ def _nearest(
     owners: (F, 3), which lists each triangle is in, once for each corner. own: (N,), the list of each
     position. names: (F, 3), what the corners are called. ModelError where there is no triangle.
     """
-    from fba.mesh.simplify import _nearest_loops as loops
-
     flat = owners.ravel()
     count = max(int(flat.max(initial=-1)), int(own.max(initial=-1))) + 1
     if not len(corners) or min(int(flat.min()), int(own.min(initial=0))) < 0:
         raise ModelError("no triangle is left around a vertex of the mesh")
-    start = np.zeros(count + 1, dtype=np.int64)
-    np.cumsum(np.bincount(flat, minlength=count), out=start[1:])
-    lists = (np.argsort(flat, kind="stable") // 3).astype(np.int32)
-    triangle, weights = np.zeros(len(positions), dtype=np.int32), np.zeros((len(positions), 3))
+    lists = np.argsort(flat, kind="stable") // 3  # the triangles of one list after the other
+    lengths = np.bincount(flat, minlength=count)[own]
+    starts = (np.cumsum(np.bincount(flat, minlength=count)) - np.bincount(flat, minlength=count))[own]
+    triangle, weights = np.zeros(len(positions), dtype=np.intp), np.zeros((len(positions), 3))
     weights[:, 0] = 1.0  # of the first triangle, for what has none
-    loops.nearest(
-        np.ascontiguousarray(positions, dtype=np.float64), np.ascontiguousarray(corners, dtype=np.float64),
-        start, lists, np.ascontiguousarray(own, dtype=np.int32), triangle, weights,
-    )  # fmt: skip
+    point = np.repeat(np.arange(len(positions)), lengths)
+    first = np.cumsum(lengths) - lengths
+    tried = lists[np.arange(len(point)) + np.repeat(starts - first, lengths)]
+    shares, squared = _on_triangles(np.asarray(positions)[point], np.asarray(corners)[tried])
+    order = np.lexsort((squared, point))
+    found = lengths > 0
+    best = order[first[found]]
+    triangle[found], weights[found] = tried[best], shares[best]
     return names[triangle], weights
+
+
+def _on_triangles(points: Floating, corners: Floating) -> tuple[Float64, Float64]:
+    """Return where each of points (N, 3) is nearest on its triangle (N, 3, 3): weights of the corners (N, 3),
+    and squared distances (N,). Ericson, "Real-Time Collision Detection" (2005), section 5.1.5."""
+    a, p = corners[:, 0].astype(np.float64), points.astype(np.float64)
+    ab, ac, ap = corners[:, 1] - a, corners[:, 2] - a, p - a
+    d1, d2, bb, bc, cc = (
+        np.einsum("ij,ij->i", one, other) for one, other in ((ab, ap), (ac, ap), (ab, ab), (ab, ac), (ac, ac))
+    )
+    d3, d4, d5, d6 = d1 - bb, d2 - bc, d1 - bc, d2 - cc
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    zero, one, across = np.zeros_like(d1), np.ones_like(d1), (d4 - d3) + (d5 - d6)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along_ab, along_ac, along_bc, whole = d1 / (d1 - d3), d2 / (d2 - d6), (d4 - d3) / across, va + vb + vc
+        cases = (  # the nearest point is a corner, on an edge, or inside
+            ((d1 <= 0) & (d2 <= 0), zero, zero),
+            ((d3 >= 0) & (d4 <= d3), one, zero),
+            ((vc <= 0) & (d1 >= 0) & (d3 <= 0), along_ab, zero),
+            ((d6 >= 0) & (d5 <= d6), zero, one),
+            ((vb <= 0) & (d2 >= 0) & (d6 <= 0), zero, along_ac),
+            ((va <= 0) & (d4 >= d3) & (d5 >= d6), 1 - along_bc, along_bc),
+            (whole > 0, vb / whole, vc / whole),
+        )
+        v, w = (np.select([case[0] for case in cases], [case[k] for case in cases]) for k in (1, 2))
+    shares = np.nan_to_num(np.stack([1 - v - w, v, w], axis=1))
+    off = np.einsum("nk,nkd->nd", shares, corners) - p
+    return shares, np.einsum("ij,ij->i", off, off)
 
 
 def _per_vertex(values: Floating | Bool, count: int, what: str) -> Float64:

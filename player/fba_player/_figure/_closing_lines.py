@@ -25,19 +25,28 @@ def closing_vertices(model: FaceModel, part: Part) -> Bool | None:
     lines = [line for names in LINES if (line := _line(model, names)) is not None]
     if part.kind not in ("skin", "mouth") or not lines:
         return None
-    from scipy.spatial import cKDTree
-
-    away, _ = cKDTree(np.concatenate(lines)).query(part.vertices)
-    return np.asarray(away < WIDTH * model.fapu.ES * 1024)
+    away = [np.linalg.norm(part.vertices - place, axis=1) for place in np.concatenate(lines)]
+    return np.asarray(np.min(away, axis=0) < WIDTH * model.fapu.ES * 1024)
 
 
 def _line(model: FaceModel, names: tuple[str, ...]) -> Float64 | None:
-    """Return points (N, 3) along the closed curve through feature points; None if one is missing."""
-    from scipy.interpolate import CubicSpline
+    """Return points (N, 3) along the closed curve through feature points; None if one is missing.
 
+    A cubic spline with equal steps between the points.
+    """
     places = np.array([model.points[point_rows()[name]] for name in names])
     if not np.isfinite(places).all():
         return None
-    closed = np.concatenate([places, places[:1]])
-    curve = CubicSpline(np.arange(len(closed)), closed, bc_type="periodic")
-    return np.asarray(curve(np.linspace(0, len(places), STEPS * len(places), endpoint=False)))
+    count = len(places)
+    following = np.roll(places, -1, axis=0)
+    around = np.roll(np.eye(count), 1, axis=1)
+    bends = np.linalg.solve(
+        4 * np.eye(count) + around + around.T, 6 * (following - 2 * places + np.roll(places, 1, axis=0))
+    )
+    t = np.linspace(0, 1, STEPS, endpoint=False)[:, None]
+    one, other = ((b**3 - b) / 6 for b in (1 - t, t))
+    curve = [
+        (1 - t) * places[k] + t * following[k] + one * bends[k] + other * bends[(k + 1) % count]
+        for k in range(count)
+    ]
+    return np.concatenate(curve)

@@ -6,13 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
 from fba.cache import load_or_make, make_key
-from fba.compiled import compiled, is_compiled
+from fba.compiled import is_compiled
 from fba.face import Deformer, FaceModel
 from fba.parameters import point_rows
 from fba_player._figure._closing_lines import closing_vertices
@@ -75,7 +74,9 @@ class FaceLight:
         self._last: tuple[tuple[object, ...], Float32] | None = None
         lips = [int(model.bound[point_rows()[name]]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
-        self._tongues = [part_rows(model, part.name) for part in model.of_kind("tongue")]
+        self._tongues, self._teeth = (
+            [part_rows(model, part.name) for part in model.of_kind(kind)] for kind in ("tongue", "teeth")
+        )
 
     @property
     def lips(self) -> Sequence[int]:
@@ -94,26 +95,41 @@ class FaceLight:
         turned, still = np.round((matrix @ turn).T, TURN_DECIMALS), np.round(matrix.T, TURN_DECIMALS)
         key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
         if self._last is None or self._last[0] != key:
-            lights = _basis(turned) if np.array_equal(turned, still) else _basis(turned, still)
+            lights = _lights(turned) if np.array_equal(turned, still) else _lights(turned, still)
             self._last = (key, self._shaded(share, lights, out))
         return self._last[1]
 
     def _shaded(self, share: float, lights: Float32, out: list[Float32]) -> Float32:
-        """Return float32 (V, 4) for a mouth open by `share`. out: (N,) for each tongue, how far it is out."""
-        light = np.empty((len(self._sway), 4), dtype=np.float32)
-        for part, baked in zip(self._model.parts, self._part_lights, strict=True):
-            # Teeth get more light than falls in, as a photographer would have it.
-            added = TEETH_FILL_SHARE * share if part.kind == "teeth" else 0.0
-            baked.shade(share, lights, added, light[baked.rows])
+        """Return float32 (V, 4) for a mouth open by `share`.
+
+        lights: as `_lights` returns them for the turned head and, where it differs, for one at rest. out:
+        (N,) for each tongue, how far it is out.
+        """
+        shut, wide, near, partly = self._tables
+        light = _reaching(shut, lights[0])
+        if len(lights) > 1:
+            still = _reaching(shut[:, partly], lights[1])
+            light[partly] = still + self._sway[partly, None] * (light[partly] - still)
+        if share > 0.0 and len(near):
+            light[near] += np.float32(share) * (_reaching(wide, lights[0]) - light[near])
+        # Teeth get more light than falls in, as a photographer would have it.
+        for rows in self._teeth if share > 0.0 else ():
+            light[rows, :2] += np.float32(TEETH_FILL_SHARE * share) * (1 - light[rows, :2])
         for rows, outside in zip(self._tongues, out, strict=True):
             if outside.any():
                 light[rows] += (np.array(FREE_LIGHT, dtype=np.float32) - light[rows]) * outside[:, None]
         return light
 
     @cached_property
-    def _part_lights(self) -> list[_PartLight]:
-        parts = self._model.parts
-        return [_part_light(self.baked, part_rows(self._model, part.name), self._sway) for part in parts]
+    def _tables(self) -> tuple[Float32, Float32, Intp, Intp]:
+        """Visibility with the mouth shut (33, V), and wide open (33, M) at vertices (M,); vertices (N,) that
+        turn with the head only partly."""
+        near = np.flatnonzero(self.baked.near)
+        shut, wide = (
+            np.concatenate([seen.light, seen.through, seen.open[:, None]], axis=1).T.copy()
+            for seen in (self.baked.shut, self.baked.wide)
+        )
+        return shut, wide[:, near], near, np.flatnonzero(self._sway < 1)
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
@@ -231,145 +247,22 @@ def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, wi
     return Visibility(*(array.astype(np.float32) for array in arrays))
 
 
-class Table(NamedTuple):
-    """Visibility of N vertices with the mouth shut, and, of the M
-    vertices near it, with the mouth wide open. A row for each harmonic: loops over vertices then run fastest.
+def _lights(*turns: Float64) -> Float32:
+    """Return float32 (N, 2, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
+    towards = [LIGHTS @ turned.T for turned in turns]
+    return np.array([weights(at / np.linalg.norm(at, axis=1)[:, None]) for at in towards], dtype=np.float32)
+
+
+def _reaching(visibility: Float32, lights: Float32) -> Float32:
+    """Return float32 (N, 4), as `FaceMesh.light`, by visibility (33, N): light, light through the skin, sky.
+
+    lights: (2, 16), as of `_lights`. By einsum: threads of linear algebra would keep the processors from
+    those that draw.
     """
-
-    light: Float32
-    """(16, N)"""
-    through: Float32
-    """(16, N)"""
-    open: Float32
-    """(N,)"""
-    wide_light: Float32
-    """(16, M)"""
-    wide_through: Float32
-    """(16, M)"""
-    wide_open: Float32
-    """(M,)"""
-    near: Intp
-
-
-@dataclass(frozen=True, eq=False)
-class _PartLight:
-    """Data for the light at the vertices of one part.
-
-    rows: the part in the model. table: visibility of its N vertices. swaying: the vertices (M,) that follow
-    the head only partly; sway: (M,), how far; still: their visibility.
-    """
-
-    rows: slice
-    table: Table
-    swaying: Intp
-    still: Table
-    sway: Float32
-
-    def shade(self, share: float, lights: Float32, added: float, light: Float32) -> None:
-        """Write light (N, 4): key light, sky, through, rim light.
-
-        share: how far the mouth is wide open. lights: (2, 16), weights of the harmonics for key and rim light
-        at vertices that move with the head; where the head has turned, two more rows for vertices at rest.
-        added: the share of the missing light that is added.
-        """
-        _light_vertices(self.table, lights[:2], share, added, light)
-        if len(lights) > 2 and len(self.swaying):
-            still = np.empty((len(self.swaying), 4), dtype=np.float32)
-            _light_vertices(self.still, lights[2:], share, added, still)
-            _blend_swaying(light, still, self.swaying, self.sway)
-
-
-def _part_light(baked: Baked, rows: slice, sway: Float32) -> _PartLight:
-    """Return the tables of a part's rows of a model. sway: (V,), of all vertices of the model."""
-    vertices = np.arange(rows.start, rows.stop)
-    swaying = np.flatnonzero(sway[vertices] < 1)
-    still = _table(baked, vertices[swaying])
-    return _PartLight(rows, _table(baked, vertices), swaying, still, sway[vertices[swaying]])
-
-
-def _table(baked: Baked, vertices: Intp) -> Table:
-    """Return the visibility of some vertices of a model."""
-    near = np.flatnonzero(baked.near[vertices])
-    shut, wide = (
-        [np.ascontiguousarray(table[rows].T) for table in visibility]
-        for visibility, rows in ((baked.shut, vertices), (baked.wide, vertices[near]))
-    )
-    return Table(shut[0], shut[1], shut[2], wide[0], wide[1], wide[2], near)
-
-
-def _basis(*turns: Float64) -> Float32:
-    """Return float32 (2 N, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
-    towards = np.empty((2 * len(turns), 3))
-    for k, into in enumerate(turns):
-        np.dot(LIGHTS, into.T, out=towards[2 * k : 2 * k + 2])
-    towards /= np.sqrt(np.einsum("ij,ij->i", towards, towards))[:, None]
-    return weights(towards).astype(np.float32)
-
-
-@compiled
-def _light_vertices(table: Table, basis: Float32, wide: float, added: float, light: Float32) -> None:
-    """Write light (N, 4): key light, sky, through, rim light.
-
-    basis: (2, 16), weights of the harmonics for key and rim light. wide: how far the mouth is wide open.
-    added: the share of the missing light that is added.
-    """
-    count = len(table.open)
-    if len(light) < count:
-        raise IndexError("light for fewer vertices than the table's")
-    share, more = np.float32(wide), np.float32(added)
-    key, rim, back = _products(table.light, table.through, basis, count)
-    for i in range(count):
-        light[i, 0], light[i, 1], light[i, 2], light[i, 3] = key[i], table.open[i], back[i], rim[i]
-    if share > 0.0 and len(table.near):
-        key, rim, back = _products(table.wide_light, table.wide_through, basis, len(table.near))
-        for k in range(len(table.near)):
-            i = table.near[k]
-            light[i, 0] += share * (key[k] - light[i, 0])
-            light[i, 1] += share * (table.wide_open[k] - light[i, 1])
-            light[i, 2] += share * (back[k] - light[i, 2])
-            light[i, 3] += share * (rim[k] - light[i, 3])
-    if more > 0.0:
-        for i in range(count):
-            light[i, 0] += more * (np.float32(1.0) - light[i, 0])
-            light[i, 1] += more * (np.float32(1.0) - light[i, 1])
-
-
-@compiled
-def _blend_swaying(light: Float32, still: Float32, rows: Intp, share: Float32) -> None:
-    """Blend rows of light (N, 4) with `still` (M, 4), that at rest, by shares (M,) of the head's motion.
-
-    Bounds: rows are numbers of vertices of the part, which light has a row for each of; still and share are
-    made for them.
-    """
-    for k in range(len(rows)):
-        for column in range(4):
-            light[rows[k], column] = still[k, column] + share[k] * (light[rows[k], column] - still[k, column])
-
-
-@compiled
-def _products(
-    light: Float32, through: Float32, basis: Float32, count: int
-) -> tuple[Float32, Float32, Float32]:
-    """Return key light, rim light, and rim light through the skin, each (count,).
-
-    Bounds: light and through (16, count) are those of a table, whose columns are its vertices; basis is
-    (2, 16).
-    """
-    key = np.zeros(count, dtype=np.float32)
-    rim, back = np.zeros_like(key), np.zeros_like(key)
-    for k in range(0, basis.shape[1], 4):  # four at a time: the sums are read and written less often
-        a, b, c, d = basis[0, k], basis[0, k + 1], basis[0, k + 2], basis[0, k + 3]
-        e, f, g, h = basis[1, k], basis[1, k + 1], basis[1, k + 2], basis[1, k + 3]
-        one, two, three, four = light[k], light[k + 1], light[k + 2], light[k + 3]
-        for i in range(count):
-            key[i] += a * one[i] + b * two[i] + c * three[i] + d * four[i]
-            rim[i] += e * one[i] + f * two[i] + g * three[i] + h * four[i]
-        one, two, three, four = through[k], through[k + 1], through[k + 2], through[k + 3]
-        for i in range(count):
-            back[i] += e * one[i] + f * two[i] + g * three[i] + h * four[i]
-    low, high = np.float32(0.0), np.float32(1.0)
-    for i in range(count):
-        key[i] = min(max(key[i], low), high)
-        rim[i] = min(max(rim[i], low), high)
-        back[i] = min(max(back[i], low), high)
-    return key, rim, back
+    (key, rim), light = lights, np.empty((visibility.shape[1], 4), dtype=np.float32)
+    free, through = visibility[:HARMONICS], visibility[HARMONICS:-1]
+    np.einsum("kn,k->n", free, key, out=light[:, 0])
+    np.einsum("kn,k->n", through, rim, out=light[:, 2])
+    np.einsum("kn,k->n", free, rim, out=light[:, 3])
+    light[:, 1] = visibility[-1]
+    return np.asarray(np.clip(light, 0.0, 1.0, out=light))

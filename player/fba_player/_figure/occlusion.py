@@ -79,32 +79,28 @@ def weights(directions: Float64) -> Float64:
     return np.asarray(harmonics(directions) * np.repeat(SOFTNESS, [1, 3, 5, 7]))
 
 
-@compiled
 def harmonics(directions: Float64) -> Float64:
-    """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3).
-
-    Bounds: values are made here, with HARMONICS columns.
-    """
-    values = np.empty((len(directions), HARMONICS))
-    for i in range(len(directions)):
-        x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
-        values[i, 0] = 0.282095
-        values[i, 1] = 0.488603 * y
-        values[i, 2] = 0.488603 * z
-        values[i, 3] = 0.488603 * x
-        values[i, 4] = 1.092548 * x * y
-        values[i, 5] = 1.092548 * y * z
-        values[i, 6] = 0.315392 * (3 * z * z - 1)
-        values[i, 7] = 1.092548 * x * z
-        values[i, 8] = 0.546274 * (x * x - y * y)
-        values[i, 9] = 0.590044 * y * (3 * x * x - y * y)
-        values[i, 10] = 2.890611 * x * y * z
-        values[i, 11] = 0.457046 * y * (5 * z * z - 1)
-        values[i, 12] = 0.373176 * z * (5 * z * z - 3)
-        values[i, 13] = 0.457046 * x * (5 * z * z - 1)
-        values[i, 14] = 1.445306 * z * (x * x - y * y)
-        values[i, 15] = 0.590044 * x * (x * x - 3 * y * y)
-    return values
+    """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
+    x, y, z = directions.T
+    values = (
+        np.full_like(x, 0.282095),
+        0.488603 * y,
+        0.488603 * z,
+        0.488603 * x,
+        1.092548 * x * y,
+        1.092548 * y * z,
+        0.315392 * (3 * z * z - 1),
+        1.092548 * x * z,
+        0.546274 * (x * x - y * y),
+        0.590044 * y * (3 * x * x - y * y),
+        2.890611 * x * y * z,
+        0.457046 * y * (5 * z * z - 1),
+        0.373176 * z * (5 * z * z - 3),
+        0.457046 * x * (5 * z * z - 1),
+        1.445306 * z * (x * x - y * y),
+        0.590044 * x * (x * x - 3 * y * y),
+    )
+    return np.stack(values, axis=1)
 
 
 @cache

@@ -82,9 +82,9 @@ class Person:
         else:
             moved = own_head.move(self.body.vertices, faps)
             self.body.skinner.skin_vertices(moved, self.body.normals, joints, positions, normals)
-        light = self.light.shade(positions, normals, joints)
+        light, limbs = self.light.light, self.light.limbs(joints)
         meshes = [
-            _mesh_in_world(shape, part_rows(self.body, name), positions, normals, light)
+            _mesh_in_world(shape, part_rows(self.body, name), positions, normals, light, limbs=limbs)
             for name, shape in self.body_shapes.items()
         ]
         if self.head is None:
@@ -95,8 +95,8 @@ class Person:
         light = self.figure.shade(faps, self.frame(joints))
         wrinkles = wrinkle_strengths(faps)
         for name, shape in self.face_shapes.items():
-            mesh = _mesh_in_world(shape, self.figure.rows(name), positions, normals, light)
-            meshes.append(replace(mesh, wrinkles=wrinkles))
+            rows = self.figure.rows(name)
+            meshes.append(_mesh_in_world(shape, rows, positions, normals, light, wrinkles=wrinkles))
         return meshes
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
@@ -124,8 +124,7 @@ def build_person(body: BodyModel, figure: FaceFigure) -> Person:
         for name, shape in shapes.items():  # a coarser face would let its teeth and eyes through
             if rows[part_rows(body, name)].mean() > HEAD_SHARE:
                 shapes[name] = replace(shape, coarser=None)
-    light = build_body_light(body, {name: shape.coarser for name, shape in shapes.items()})
-    return Person(body, figure, head, shapes, face_shapes, light)
+    return Person(body, figure, head, shapes, face_shapes, build_body_light(body))
 
 
 def head_rows(body: BodyModel) -> Bool:
@@ -187,7 +186,7 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
 
 
 def _mesh_in_world(
-    shape: FaceShape, rows: slice, positions: Float32, normals: Float32, light: Float32
+    shape: FaceShape, rows: slice, positions: Float32, normals: Float32, light: Float32, **more: Float32
 ) -> FaceMesh:
-    """Return a part, cut from its model's arrays (V, 3), (V, 3) and (V, 4) in the world."""
-    return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NO_TURN, NO_TURN)
+    """Return a part, cut from its model's arrays (V, 3), (V, 3), (V, 4) in the world. more: other fields."""
+    return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NO_TURN, NO_TURN, **more)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
@@ -10,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32, Intp
-from fba.compiled import compiled
 from fba.mesh.simplify import TOLERANCES
 from fba_player.view._view import FaceMesh, FaceShape
 
@@ -85,7 +85,7 @@ class Details:
         chosen, count = list(meshes), dict[FaceShape, int]()
         for face in _faces(meshes):
             parts = [meshes[number] for number in face]
-            away = min(distance(mesh, position) for mesh in parts)
+            away = distance(max(parts, key=lambda mesh: len(mesh.positions)), position)
             errors = [level.error for level in parts[0].shape.levels]
             wanted = bisect_right(errors, MAX_FACE_ERROR_PIXELS * pixel * away)
             if lod != "auto":
@@ -201,44 +201,18 @@ def _faces(meshes: list[FaceMesh]) -> list[list[int]]:
     return faces
 
 
-@compiled
 def _mean(values: Float32, rows: Int32, weights: Float32) -> Float32:
-    """Return the weighted means (M, C) of rows (M, 3) of values (V, C).
-
-    IndexError where a row is not among the values.
-    """
-    result = np.zeros((len(rows), values.shape[1]), dtype=np.float32)
-    for i in range(len(rows)):
-        for k in range(3):
-            row = rows[i, k]
-            if row < 0 or row >= len(values):
-                raise IndexError("a level of detail names a vertex that does not exist")
-            for j in range(values.shape[1]):
-                result[i, j] += weights[i, k] * values[row, j]
-    return result
+    """Return the weighted means (M, C) of rows (M, 3) of values (V, C)."""
+    return np.asarray(np.einsum("nk,nkc->nc", weights, values.take(rows, axis=0)))
 
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """Return the distance from an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
     sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED_VERTICES, 1)]
-    return float(_nearest(sample, mesh.matrix, eye))
-
-
-@compiled
-def _nearest(positions: Float32, matrix: Float64, eye: Float64) -> float:
-    least = np.inf
-    for i in range(len(positions)):
-        squared = 0.0
-        for k in range(3):
-            away = matrix[k, 3] - eye[k]
-            for j in range(3):
-                away += matrix[k, j] * positions[i, j]
-            squared += away * away
-        least = min(least, squared)
-    scale = 0.0
-    for k in range(3):
-        scale += matrix[k, 0] * matrix[k, 0]
-    return np.sqrt(least / scale) if least < np.inf and scale > 0.0 else 0.0
+    away = sample @ mesh.matrix[:3, :3].T + (mesh.matrix[:3, 3] - eye)
+    scale = float(mesh.matrix[:3, 0] @ mesh.matrix[:3, 0])
+    least = float(np.einsum("ij,ij->i", away, away).min(initial=np.inf))
+    return math.sqrt(least / scale) if math.isfinite(least) and scale > 0 else 0.0
 
 
 def share_memory(one: Float32, other: Float32) -> bool:

@@ -21,7 +21,7 @@ from fba_player.gl._resources import (
     write_buffer,
 )
 from fba_player.gl._textures import Pictures, count_halvings
-from fba_player.view._view import FaceMesh, FaceShape
+from fba_player.view._view import MOST_LIMBS, FaceMesh, FaceShape
 
 CACHED_SHAPES = 512
 """Number of parts whose buffers are cached; the least recently used goes first."""
@@ -31,6 +31,8 @@ MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
 MIN_RELIEF = 0.25
 """The skin's relief is not drawn if it is reduced to less than this share of its size."""
+FAR = -1e4
+"""Place (m) along each axis of limbs that a body lacks: away from the light."""
 
 
 class FaceRenderer:
@@ -137,6 +139,7 @@ class FaceRenderer:
             for option, used in (
                 ("SMOOTH", shape.smooth),
                 ("HAIRS", shape.across is not None),
+                ("LIMBS", mesh.limbs is not None),
                 ("TEXTURED", picture is not None),
                 ("WRINKLED", wrinkles is not None),
                 ("FINE", repeats is not None),
@@ -151,6 +154,8 @@ class FaceRenderer:
         _set_pose(program, mesh)
         if "CUT" in options:
             set_uniform(program, "cut", CORE_OPACITY if core else shape.cutoff)
+        if mesh.limbs is not None:
+            set_uniform(program, "limbs", _padded(mesh.limbs))
         if picture is not None:
             picture.use(0)
         if repeats is not None:
@@ -237,6 +242,14 @@ def _set_pose(program: Any, mesh: FaceMesh) -> None:
     set_uniform(program, "world", matrix_bytes(mesh.matrix))
     set_uniform(program, "turn", tuple(mesh.turn.tolist()))
     set_uniform(program, "centre", tuple(mesh.centre.tolist()))
+
+
+def _padded(limbs: Float32) -> bytes:
+    """Return limbs (2 K, 4) as the shader has them: thin ones far away in place of those missing."""
+    padded = np.full((2 * MOST_LIMBS, 4), FAR, dtype=np.float32)
+    padded[:, 3] = 1e-3
+    padded[: len(limbs)] = limbs[: len(padded)]
+    return padded.tobytes()
 
 
 def _set_wrinkles(program: Any, mesh: FaceMesh) -> None:

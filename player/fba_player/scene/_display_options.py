@@ -135,7 +135,9 @@ class DisplayOptions:
         if not switches["shadows"]:
             unshaded = np.array(UNSHADED, dtype=np.float32)
             faces = [
-                replace(mesh, light=np.broadcast_to(unshaded, (len(mesh.positions), len(unshaded))))
+                replace(
+                    mesh, light=np.broadcast_to(unshaded, (len(mesh.positions), len(unshaded))), limbs=None
+                )
                 for mesh in view.faces
             ]
             view = replace(view, faces=faces, blobs=view.blobs[:0])

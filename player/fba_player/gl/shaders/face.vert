@@ -1,7 +1,7 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
-// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds the skin's relief; LIMBS (of the web
-// player) lets a body's limbs keep light from each other; SOLID ignores alpha, CUT makes holes where
+// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds the skin's relief; LIMBS lets a body's
+// limbs keep light from each other; SOLID ignores alpha, CUT makes holes where
 // it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
@@ -52,7 +52,7 @@ vec3 turned(vec3 at, vec3 axis, float sine, float cosine) {
 }
 
 #ifdef LIMBS
-// Shares of key light and sky that come past limbs, as in `fba_player._figure.body_light`.
+// Shares of key light and sky that come past limbs: see `fba_player._figure.body_light`.
 vec2 past_limbs(vec3 at, vec3 n) {
     vec2 past = vec2(1.0);
     for (int k = 0; k < 24; k += 2) {
