@@ -33,6 +33,8 @@ SILENT = -60.0
 CLEAR = 20.0
 """dB between the loud and the quiet parts of a sound, below which noise hides sounds from a recogniser."""
 MISSED_NAMED = 5
+WIDE = {"beam": 1e-80, "wbeam": 1e-60, "pbeam": 1e-80}
+"""Beams of the recogniser that lose no word of a given text."""
 
 
 def find_speech(
@@ -50,7 +52,7 @@ def find_speech(
     Raises UnsupportedError without pocketsphinx, FormatError for an empty sound, and for a text of which less
     than three words in ten are heard, although there is no noise.
     """
-    listener = _Listener(words or (), language)
+    listener = _Listener(words, language)
     phones: list[Phone] = []
     heard: list[Word] = []
     missed: list[Word] = []
@@ -61,11 +63,11 @@ def find_speech(
         if not len(sound):
             continue
         end = start + len(sound) / RATE
-        free = listener.recognise(sound)
         levels.append(measure_loudness(sound))
         if words is None:
-            phones += _later(free, start)
+            phones += _later(listener.listen(sound), start)
         else:
+            free = listener.recognise(sound)
             aligned, spoken = listener.align(sound, last, begins=start == 0)
             aligned_once |= bool(aligned)
             phones += _later(aligned or free, start)
@@ -98,15 +100,18 @@ def _unfit(share: float, count: int, missed: Sequence[Word], left: Sequence[Pron
 class _Listener:
     """Recognisers that take a sound piece by piece, and a text as far as they have come in it."""
 
-    def __init__(self, words: Sequence[Pronounced], language: str) -> None:
-        self.left = list(words)
+    def __init__(self, words: Sequence[Pronounced] | None, language: str) -> None:
+        self.left = list(words or ())
         self._english = language.startswith("en")
         from_model = _model_path("en-us/en-us-phone.lm.bin")
-        self._free = _decoder(allphone=from_model, lw=2.0, pip=0.3)
-        self._forced: Any = _decoder(lm=None, bestpath=False) if words else None
+        self._free = _decoder(**WIDE, allphone=from_model, lw=2.0, pip=0.3)
+        self._forced: Any = _decoder(**WIDE, lm=None, bestpath=False)
+        self._dictation: Any = None
+        if words is None and self._english:
+            self._dictation = _decoder(fwdflat=False, bestpath=False)
         self._names: dict[str, list[str]] = {}  # of the phones in IPA, by words that the model lacks
         self._stresses: dict[str, tuple[float, ...]] = {}  # of vowels, by words
-        for word in dict.fromkeys(words):
+        for word in dict.fromkeys(self.left):
             self._learn(word)
 
     def _learn(self, word: Pronounced) -> None:
@@ -126,18 +131,27 @@ class _Listener:
         self._names[word.text] = [phone for _, phone in pairs]
         self._forced.add_word(_spelled(word.text, self._english), " ".join(name for name, _ in pairs), True)
 
+    def listen(self, sound: Int16) -> list[Phone]:
+        """Return the phones of a sound without a text: of the likeliest English words, if it has any.
+
+        Wrong words that sound alike still show the right visemes, more of them than single phones do.
+        """
+        words: list[str] = []
+        if self._dictation is not None:
+            _run(self._dictation, sound)
+            found = self._dictation.hyp()
+            words = [] if found is None else found.hypstr.split()
+        phones, _ = self._force(sound, [Pronounced(word) for word in words]) if words else ([], [])
+        return _silenced(phones, sound) if phones else self.recognise(sound)
+
     def recognise(self, sound: Int16) -> list[Phone]:
-        """Return the phones of a sound without a text."""
+        """Return the phones of a sound, each found by itself."""
         _run(self._free, sound)
         found = (
             Phone(each.word, each.start_frame * FRAME - PADDING, (each.end_frame + 1) * FRAME - PADDING)
             for each in self._free.seg() or ()
         )
-        levels = measure_loudness(sound)
-        return [
-            Phone(SILENCE, each.start, each.end) if _is_silent(levels, each) else each
-            for each in _within(found, len(sound) / RATE)
-        ]
+        return _silenced(found, sound)
 
     def align(self, sound: Int16, last: bool, *, begins: bool) -> tuple[list[Phone], list[Word]]:
         """Return the phones and words of the next part of the text in a sound, as far as it is spoken there.
@@ -203,6 +217,15 @@ class _Listener:
         return phones, words
 
 
+def _silenced(phones: Iterable[Phone], sound: Int16) -> list[Phone]:
+    """Return phones within a sound; those that are too soft to be heard become silence."""
+    levels = measure_loudness(sound)
+    return [
+        Phone(SILENCE, each.start, each.end) if _is_silent(levels, each) else each
+        for each in _within(phones, len(sound) / RATE)
+    ]
+
+
 def _is_silent(levels: Float64, phone: Phone) -> bool:
     """Whether a sound is too soft for what a recogniser hears in it. levels: dB, a hundred in a second."""
     part = levels[int(phone.start * 100) : int(phone.end * 100) + 1]
@@ -243,7 +266,7 @@ def _model_path(name: str) -> str:
 def _decoder(**options: Any) -> Any:
     from pocketsphinx import Decoder
 
-    return Decoder(beam=1e-80, wbeam=1e-60, pbeam=1e-80, loglevel="FATAL", **options)
+    return Decoder(loglevel="FATAL", **options)
 
 
 def _run(decoder: Any, sound: Int16) -> None:
