@@ -34,7 +34,8 @@ CLEAR = 20.0
 """dB between the loud and the quiet parts of a sound, below which noise hides sounds from a recogniser."""
 MISSED_NAMED = 5
 WIDE = {"beam": 1e-80, "wbeam": 1e-60, "pbeam": 1e-80}
-"""Beams of the recogniser that lose no word of a given text."""
+WIDEST = {"beam": 1e-200, "wbeam": 1e-150, "pbeam": 1e-200}
+"""Beams of the recogniser that seldom lose a word of a given text, and those of a second try."""
 
 
 def find_speech(
@@ -106,6 +107,8 @@ class _Listener:
         from_model = _model_path("en-us/en-us-phone.lm.bin")
         self._free = _decoder(**WIDE, allphone=from_model, lw=2.0, pip=0.3)
         self._forced: Any = _decoder(**WIDE, lm=None, bestpath=False)
+        self._patient: Any = None
+        self._added: dict[str, str] = {}  # phones in ARPAbet of words that the model lacks, as it spells them
         self._dictation: Any = None
         if words is None and self._english:
             self._dictation = _decoder(fwdflat=False, bestpath=False)
@@ -129,7 +132,9 @@ class _Listener:
                 'pip install "mpeg4-fba[speech]"'
             )
         self._names[word.text] = [phone for _, phone in pairs]
-        self._forced.add_word(_spelled(word.text, self._english), " ".join(name for name, _ in pairs), True)
+        spelled = _spelled(word.text, self._english)
+        self._added[spelled] = " ".join(name for name, _ in pairs)
+        self._forced.add_word(spelled, self._added[spelled], True)
 
     def listen(self, sound: Int16) -> list[Phone]:
         """Return the phones of a sound without a text: of the likeliest English words, if it has any.
@@ -186,17 +191,30 @@ class _Listener:
         return 0 if found is None else len(found.hypstr.split())
 
     def _force(self, sound: Int16, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Word]]:
-        self._forced.set_align_text(" ".join(_spelled(word.text, self._english) for word in spoken))
+        """Return the phones and words of a text in a sound; no phones where nothing is like the words."""
+        phones, words = self._align_by(self._forced, sound, spoken)
+        if len(words) < len(spoken):  # it lost its way: again, more patiently
+            if self._patient is None:
+                self._patient = _decoder(**WIDEST, lm=None, bestpath=False)
+                for spelled, names in self._added.items():
+                    self._patient.add_word(spelled, names, True)
+            phones, words = self._align_by(self._patient, sound, spoken)
+        if len(words) < len(spoken):
+            return [], [Word(word.text, 0.0, len(sound) / RATE) for word in spoken]
+        return phones, words
+
+    def _align_by(
+        self, decoder: Any, sound: Int16, spoken: Sequence[Pronounced]
+    ) -> tuple[list[Phone], list[Word]]:
+        decoder.set_align_text(" ".join(_spelled(word.text, self._english) for word in spoken))
         try:
-            _run(self._forced, sound)
-            self._forced.set_alignment()
-            _run(self._forced, sound)
-            alignment = self._forced.get_alignment()
+            _run(decoder, sound)
+            decoder.set_alignment()
+            _run(decoder, sound)
+            alignment = decoder.get_alignment()
         except RuntimeError:
             alignment = None
-        if alignment is None:  # nothing in the sound is like the words
-            return [], [Word(word.text, 0.0, len(sound) / RATE) for word in spoken]
-        return self._collect(alignment, spoken)
+        return ([], []) if alignment is None else self._collect(alignment, spoken)
 
     def _collect(self, alignment: Any, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Word]]:
         phones: list[Phone] = []
