@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import wave
 from functools import cache
 from pathlib import Path
 
@@ -78,6 +79,7 @@ def test_script_makes_the_same_bytes(tmp_path: Path) -> None:
 def test_files_are_small() -> None:
     assert (SAMPLES / "hello.bvh").stat().st_size <= 600_000
     assert (SAMPLES / "hello.fap").stat().st_size <= 150_000
+    assert (SAMPLES / "hello.wav").stat().st_size <= 200_000
 
 
 def test_markers_say_what_the_face_says() -> None:
@@ -188,9 +190,23 @@ def test_blinks_close_the_eyes() -> None:
 def test_lips_meet_for_m_and_open_for_a_vowel() -> None:
     rate = float(performance().rate)
     opening = -fap("raise_b_midlip") - fap("lower_t_midlip")
-    assert opening[round(4.28 * rate)] < 30  # "me"
+    assert opening[round(4.18 * rate)] < 30  # "me"
     assert opening[round(3.92 * rate)] > 200  # "all"
     assert fap("open_jaw").max() > 150
+
+
+def test_mouth_moves_while_its_voice_is_heard() -> None:
+    with wave.open(str(SAMPLES / "hello.wav")) as file:
+        samples = np.frombuffer(file.readframes(file.getnframes()), dtype="<i2").astype(float)
+        rate = file.getframerate()
+    loud = (
+        np.abs(samples[: len(samples) // (rate // 25) * (rate // 25)].reshape(-1, rate // 25)).max(axis=1)
+        > 1000
+    )
+    heard = np.zeros(len(shown()), dtype=bool)
+    heard[: len(loud)] = loud
+    jaw = fap("open_jaw")
+    assert jaw[heard].mean() > 3 * jaw[~heard].mean()
 
 
 def test_looks_at_us_while_waving() -> None:

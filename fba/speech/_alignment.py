@@ -35,6 +35,9 @@ SILENT = -60.0
 CLEAR = 20.0
 """dB between the loud and the quiet parts of a sound, below which noise hides sounds from a recogniser."""
 MISSED_NAMED = 5
+WIDE = {"beam": 1e-80, "wbeam": 1e-60, "pbeam": 1e-80}
+WIDEST = {"beam": 1e-200, "wbeam": 1e-150, "pbeam": 1e-200}
+"""Beams of the recogniser that seldom lose a word of a given text, and those of a second try."""
 
 
 def find_speech(
@@ -52,7 +55,7 @@ def find_speech(
     Raises UnsupportedError without pocketsphinx, FormatError for an empty sound, and for a text of which less
     than three words in ten are heard, although there is no noise.
     """
-    listener = _Listener(words or (), language)
+    listener = _Listener(words, language)
     phones: list[Phone] = []
     heard: list[Word] = []
     missed: list[Word] = []
@@ -64,11 +67,11 @@ def find_speech(
         if not len(sound):
             continue
         end = start + len(sound) / RATE
-        free = listener.recognise(sound)
         levels.append(measure_loudness(sound))
         if words is None:
-            phones += _later(free, start)
+            phones += _later(listener.listen(sound), start)
         else:
+            free = listener.recognise(sound)
             aligned, spoken = listener.align(sound, last)
             aligned_once |= bool(aligned)
             filled, gaps = _fill(aligned or [Phone(SILENCE, 0.0, end - start)], free)
@@ -128,14 +131,19 @@ def _fill(aligned: Sequence[Phone], free: Sequence[Phone]) -> tuple[list[Phone],
 class _Listener:
     """Recognisers that take a sound piece by piece, and a text as far as they have come in it."""
 
-    def __init__(self, words: Sequence[Pronounced], language: str) -> None:
-        self.left = list(words)
+    def __init__(self, words: Sequence[Pronounced] | None, language: str) -> None:
+        self.left = list(words or ())
         self._english = language.startswith("en")
         self._free = recogniser_of_phones()
-        self._forced: Any = _decoder(lm=None, bestpath=False) if words else None
+        self._forced: Any = _decoder(**WIDE, lm=None, bestpath=False)
+        self._patient: Any = None
+        self._added: dict[str, str] = {}  # phones in ARPAbet of words that the model lacks, as it spells them
+        self._dictation: Any = None
+        if words is None and self._english:
+            self._dictation = _decoder(fwdflat=False, bestpath=False)
         self._names: dict[str, list[str]] = {}  # of the phones in IPA, by words that the model lacks
         self._stresses: dict[str, tuple[float, ...]] = {}  # of vowels, by words
-        for word in dict.fromkeys(words):
+        for word in dict.fromkeys(self.left):
             self._learn(word)
 
     def _learn(self, word: Pronounced) -> None:
@@ -153,20 +161,31 @@ class _Listener:
                 'pip install "mpeg4-fba[speech]"'
             )
         self._names[word.text] = [phone for _, phone in pairs]
-        self._forced.add_word(_spelled(word.text, self._english), " ".join(name for name, _ in pairs), True)
+        spelled = _spelled(word.text, self._english)
+        self._added[spelled] = " ".join(name for name, _ in pairs)
+        self._forced.add_word(spelled, self._added[spelled], True)
+
+    def listen(self, sound: Int16) -> list[Phone]:
+        """Return the phones of a sound without a text: of the likeliest English words, if it has any.
+
+        Wrong words that sound alike still show the right visemes, more of them than single phones do.
+        """
+        words: list[str] = []
+        if self._dictation is not None:
+            _run(self._dictation, sound)
+            found = self._dictation.hyp()
+            words = [] if found is None else found.hypstr.split()
+        phones, _ = self._force(sound, [Pronounced(word) for word in words]) if words else ([], [])
+        return _silenced(phones, sound) if phones else self.recognise(sound)
 
     def recognise(self, sound: Int16) -> list[Phone]:
-        """Return the phones of a sound without a text."""
+        """Return the phones of a sound, each found by itself."""
         _run(self._free, sound)
         found = (
             Phone(each.word, each.start_frame * FRAME - PADDING, (each.end_frame + 1) * FRAME - PADDING)
             for each in self._free.seg() or ()
         )
-        levels = measure_loudness(sound)
-        return [
-            Phone(SILENCE, each.start, each.end) if is_silent(levels, each) else each
-            for each in _within(found, len(sound) / RATE)
-        ]
+        return _silenced(found, sound)
 
     def align(self, sound: Int16, last: bool) -> tuple[list[Phone], list[Word]]:
         """Return the phones and words of the next part of the text in a sound, as far as it is spoken there.
@@ -201,17 +220,30 @@ class _Listener:
         return 0 if found is None else len(found.hypstr.split())
 
     def _force(self, sound: Int16, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Word]]:
-        self._forced.set_align_text(" ".join(_spelled(word.text, self._english) for word in spoken))
+        """Return the phones and words of a text in a sound; no phones where nothing is like the words."""
+        phones, words = self._align_by(self._forced, sound, spoken)
+        if len(words) < len(spoken):  # it lost its way: again, more patiently
+            if self._patient is None:
+                self._patient = _decoder(**WIDEST, lm=None, bestpath=False)
+                for spelled, names in self._added.items():
+                    self._patient.add_word(spelled, names, True)
+            phones, words = self._align_by(self._patient, sound, spoken)
+        if len(words) < len(spoken):
+            return [], [Word(word.text, 0.0, len(sound) / RATE) for word in spoken]
+        return phones, words
+
+    def _align_by(
+        self, decoder: Any, sound: Int16, spoken: Sequence[Pronounced]
+    ) -> tuple[list[Phone], list[Word]]:
+        decoder.set_align_text(" ".join(_spelled(word.text, self._english) for word in spoken))
         try:
-            _run(self._forced, sound)
-            self._forced.set_alignment()
-            _run(self._forced, sound)
-            alignment = self._forced.get_alignment()
+            _run(decoder, sound)
+            decoder.set_alignment()
+            _run(decoder, sound)
+            alignment = decoder.get_alignment()
         except RuntimeError:
             alignment = None
-        if alignment is None:  # nothing in the sound is like the words
-            return [], [Word(word.text, 0.0, len(sound) / RATE) for word in spoken]
-        return self._collect(alignment, spoken)
+        return ([], []) if alignment is None else self._collect(alignment, spoken)
 
     def _collect(self, alignment: Any, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Word]]:
         phones: list[Phone] = []
@@ -230,6 +262,15 @@ class _Listener:
             for name, stress, (_, start, length) in zip(names, stresses, parts, strict=True):
                 phones.append(Phone(name, start, start + length, stress))
         return phones, words
+
+
+def _silenced(phones: Iterable[Phone], sound: Int16) -> list[Phone]:
+    """Return phones within a sound; those that are too soft to be heard become silence."""
+    levels = measure_loudness(sound)
+    return [
+        Phone(SILENCE, each.start, each.end) if is_silent(levels, each) else each
+        for each in _within(phones, len(sound) / RATE)
+    ]
 
 
 def is_silent(levels: Float64, phone: Phone) -> bool:
@@ -271,13 +312,13 @@ def _model_path(name: str) -> str:
 
 def recogniser_of_phones() -> Any:
     """Return pocketsphinx' recogniser of phones without a text. Raises UnsupportedError without it."""
-    return _decoder(allphone=_model_path("en-us/en-us-phone.lm.bin"), lw=2.0, pip=0.3)
+    return _decoder(**WIDE, allphone=_model_path("en-us/en-us-phone.lm.bin"), lw=2.0, pip=0.3)
 
 
 def _decoder(**options: Any) -> Any:
     from pocketsphinx import Decoder
 
-    return Decoder(beam=1e-80, wbeam=1e-60, pbeam=1e-80, loglevel="FATAL", **options)
+    return Decoder(loglevel="FATAL", **options)
 
 
 def _run(decoder: Any, sound: Int16) -> None:

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 from fba.atomic import PathLike
 from fba.errors import FormatError
 from fba.source import naming_file, open_source
+from fba.speech._mouth_cues import (
+    Entry,
+    parse_events,
+    parse_moho,
+    parse_papagayo,
+    parse_polly_lines,
+    parse_rhubarb_json,
+    parse_rhubarb_tsv,
+    parse_rhubarb_xml,
+)
 from fba.speech._sounds import SILENCE, Phone, Speech, find_sound
 
 MOST_BYTES = 1 << 26
@@ -20,22 +30,13 @@ MOST_HEADER = 4096
 """Characters of the titles of a table's columns."""
 MOST_SECONDS = 100 * 3600.0
 
-OCULUS = {
-    "sil": 0, "PP": 1, "FF": 2, "TH": 3, "DD": 4, "kk": 5, "CH": 6, "SS": 7, "nn": 8, "RR": 9, "aa": 10,
-    "E": 11, "ih": 12, "I": 12, "oh": 13, "O": 13, "ou": 14, "U": 14,
-}  # fmt: skip
-"""MPEG-4's visemes of the 15 of Oculus' lip sync, by their names."""
-AZURE = (0, 10, 10, 13, 11, 9, 12, 14, 13, 10, 13, 10, 0, 9, 8, 7, 6, 3, 2, 4, 5, 1)
-"""MPEG-4's visemes of the 22 of Azure's speech service, by their numbers."""
-RHUBARB = {"A": 1, "B": 7, "C": 11, "D": 10, "E": 13, "F": 14, "G": 2, "H": 8, "X": 0}
-"""MPEG-4's visemes of Rhubarb's nine mouth shapes, by their letters."""
-
 
 def read_timings(path: PathLike) -> Speech:
     """Return the timings of a file, whose kind is seen by its content.
 
-    Praat's TextGrid (long and short, the tier named phones, phonemes or segments, else the only one), NIST's
-    CTM, Rhubarb's JSON and TSV, the visemes of Azure and Oculus as JSON, SRT whose texts are phones.
+    Praat's TextGrid (long and short, the tier named phones, phonemes or segments, else the only one), the
+    JSON and CSV of the Montreal Forced Aligner, NIST's CTM, SRT whose texts are phones; the mouths of Rhubarb
+    (JSON, TSV, XML), Papagayo and Moho, the visemes of Azure, Oculus and Polly as JSON.
 
     Raises FormatError for a file of no such kind, unknown sounds, or times that run back.
     """
@@ -43,7 +44,7 @@ def read_timings(path: PathLike) -> Speech:
         text = _read_text(path)
         for kind, fits, parse in _KINDS:
             if fits(text):
-                return _order(parse(text), kind)
+                return _order(_parse(parse, text), kind)
     if "jawopen" in text[:MOST_HEADER].lower():
         raise FormatError(
             f"holds ARKit's curves, the motion of a face rather than timings: fba encode {path} -o OUT.fba "
@@ -51,12 +52,10 @@ def read_timings(path: PathLike) -> Speech:
             path=path,
         )
     raise FormatError(
-        "is no file of timings: TextGrid, CTM, Rhubarb, Azure, Oculus and SRT can be read", path=path
+        "is no file of timings; those of Praat, Montreal Forced Aligner, CTM, SRT, Rhubarb, Papagayo, Moho, "
+        "Azure, Oculus and Polly can be read",
+        path=path,
     )
-
-
-Entry = tuple[float, float, int | str]
-"""Start, end (seconds), and what is there: a viseme's number, or a phone."""
 
 
 def _read_text(path: PathLike) -> str:
@@ -102,7 +101,7 @@ PHONES = (SILENCE, "P", "F", "TH", "T", "K", "CH", "S", "L", "R", "AA", "EH", "I
 """A phone that shows each viseme."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_TIERS = ("phones", "phonemes", "segments", "phone", "phoneme", "mau", "pho")
+_TIERS = ("phones", "phonemes", "segments", "phone", "phoneme", "mau", "pho", "phonalign", "phons")
 
 
 def _parse_textgrid(text: str) -> list[Entry]:
@@ -129,13 +128,18 @@ def _parse_textgrid(text: str) -> list[Entry]:
                 tiers[name.lower()] = entries
     except (StopIteration, ValueError):
         raise FormatError("its TextGrid is cut off or damaged") from None
+    return _choose_tier(tiers)
+
+
+def _choose_tier(tiers: dict[str, list[Entry]]) -> list[Entry]:
+    """Return the tier of phones. tiers: by their names in small letters, with or without the speaker's."""
     for wanted in _TIERS:
         for name, entries in tiers.items():
             if name == wanted or name.endswith(f"- {wanted}"):
                 return entries
     if len(tiers) == 1:
         return next(iter(tiers.values()))
-    raise FormatError(f"its TextGrid has no tier named phones; its tiers are {', '.join(tiers) or 'none'}")
+    raise FormatError(f"has no tier named phones; its tiers are {', '.join(tiers) or 'none'}")
 
 
 def _unquoted(text: str) -> str:
@@ -152,40 +156,24 @@ def _parse_ctm(text: str) -> list[Entry]:
     return [(float(row[2]), float(row[2]) + float(row[3]), re.sub(r"_[BIES]$", "", row[4])) for row in rows]
 
 
-def _parse_rhubarb_json(text: str) -> list[Entry]:
-    cues = json.loads(text)["mouthCues"]
-    return [(float(cue["start"]), float(cue["end"]), RHUBARB[cue["value"]]) for cue in cues]
+def _parse_mfa_json(text: str) -> list[Entry]:
+    """The Montreal Forced Aligner's JSON: tiers of intervals."""
+    tiers = json.loads(text)["tiers"]
+    return _choose_tier(
+        {
+            name.lower(): [(float(start), float(end), str(what)) for start, end, what in tier["entries"]]
+            for name, tier in tiers.items()
+        }
+    )
 
 
-def _parse_rhubarb_tsv(text: str) -> list[Entry]:
-    rows = [line.split("\t") for line in text.splitlines() if line.strip()]
-    starts = [float(row[0]) for row in rows]
-    return [
-        (start, end, RHUBARB[row[1].strip()])
-        for start, end, row in zip(starts, [*starts[1:], starts[-1]], rows, strict=True)
-    ]
-
-
-def _parse_events(text: str) -> list[Entry]:
-    """Azure's and Oculus' events: each lasts until the next; the last until its end, else for 0.1 s."""
-    events = json.loads(text)
-    if isinstance(events, dict):
-        events = events.get("visemes", events.get("events"))
-    found = [_event(event) for event in events]
-    if not found:
-        return []
-    ends = [*(start for start, _ in found[1:]), float(events[-1].get("end", found[-1][0] + 0.1))]
-    return [(start, end, viseme) for (start, viseme), end in zip(found, ends, strict=True)]
-
-
-def _event(event: Any) -> tuple[float, int]:
-    lowered = {str(key).lower().replace("_", ""): value for key, value in event.items()}
-    what = next(lowered[key] for key in ("visemeid", "viseme", "value", "name", "id") if key in lowered)
-    viseme = OCULUS[what.removeprefix("viseme_")] if isinstance(what, str) else AZURE[what]
-    for key, unit in (("audiooffset", 1e-7), ("offset", 1e-3), ("ms", 1e-3), ("time", 1.0), ("start", 1.0)):
-        if key in lowered:
-            return float(lowered[key]) * unit, viseme
-    raise KeyError("time")
+def _parse_mfa_csv(text: str) -> list[Entry]:
+    """The Montreal Forced Aligner's table: Begin, End, Label, Type, Speaker."""
+    rows = list(csv.DictReader(text.splitlines()))
+    speakers = {row["Speaker"] for row in rows}
+    if len(speakers) > 1:
+        raise FormatError(f"its table holds {len(speakers)} speakers; keep one")
+    return [(float(row["Begin"]), float(row["End"]), row["Label"]) for row in rows if row["Type"] == "phones"]
 
 
 def _parse_srt(text: str) -> list[Entry]:
@@ -207,24 +195,26 @@ def _clock(text: str) -> float:
     return int(hours) * 3600 + int(minutes) * 60 + float(seconds)
 
 
-def _checked(parse: Callable[[str], list[Entry]]) -> Callable[[str], list[Entry]]:
-    def checked(text: str) -> list[Entry]:
-        try:
-            return parse(text)
-        except FormatError:
-            raise
-        except (
-            ValueError,
-            KeyError,
-            IndexError,
-            TypeError,
-            AttributeError,
-            RecursionError,
-            StopIteration,
-        ) as error:
-            raise FormatError(f"its timings are damaged: {type(error).__name__}, {error}") from None
+def _parse(parse: Callable[[str], list[Entry]], text: str) -> list[Entry]:
+    try:
+        return parse(text)
+    except FormatError:
+        raise
+    except (
+        ValueError,
+        KeyError,
+        IndexError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+        StopIteration,
+        ZeroDivisionError,
+    ) as error:
+        raise FormatError(f"its timings are damaged: {type(error).__name__}, {error}") from None
 
-    return checked
+
+def _is_json(text: str) -> bool:
+    return text.lstrip()[:1] == "{"
 
 
 def _is_ctm(text: str) -> bool:
@@ -235,18 +225,20 @@ def _is_ctm(text: str) -> bool:
 
 
 _KINDS: tuple[tuple[str, Callable[[str], bool], Callable[[str], list[Entry]]], ...] = (
-    ("TextGrid", lambda text: "ooTextFile" in text[:40], _checked(_parse_textgrid)),
-    (
-        "Rhubarb",
-        lambda text: text.lstrip()[:1] == "{" and '"mouthCues"' in text,
-        _checked(_parse_rhubarb_json),
-    ),
-    ("visemes", lambda text: text.lstrip()[:1] in ("[", "{"), _checked(_parse_events)),
-    ("SRT", lambda text: re.match(r"\s*\d+\s*\r?\n[^\n]*-->", text) is not None, _checked(_parse_srt)),
+    ("TextGrid", lambda text: "ooTextFile" in text[:40], _parse_textgrid),
+    ("Montreal Forced Aligner", lambda text: _is_json(text) and '"tiers"' in text, _parse_mfa_json),
+    ("Montreal Forced Aligner", lambda text: text.startswith("Begin,End,Label,Type,Speaker"), _parse_mfa_csv),
+    ("Rhubarb", lambda text: _is_json(text) and '"mouthCues"' in text, parse_rhubarb_json),
+    ("Polly", lambda text: _is_json(text) and '"type"' in text.lstrip().split("\n")[0], parse_polly_lines),
+    ("visemes", lambda text: text.lstrip()[:1] in ("[", "{"), parse_events),
+    ("Rhubarb", lambda text: "<rhubarbResult" in text[:MOST_HEADER], parse_rhubarb_xml),
+    ("Moho", lambda text: text.startswith("MohoSwitch1"), parse_moho),
+    ("Papagayo", lambda text: text.startswith("lipsync version 1"), parse_papagayo),
+    ("SRT", lambda text: re.match(r"\s*\d+\s*\r?\n[^\n]*-->", text) is not None, _parse_srt),
     (
         "Rhubarb",
         lambda text: re.match(rf"{_NUMBER}\t[A-HX]\s*(\n|$)", text) is not None,
-        _checked(_parse_rhubarb_tsv),
+        parse_rhubarb_tsv,
     ),
-    ("CTM", _is_ctm, _checked(_parse_ctm)),
+    ("CTM", _is_ctm, _parse_ctm),
 )

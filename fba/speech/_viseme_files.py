@@ -6,8 +6,9 @@ import json
 from collections.abc import Sequence
 from typing import Literal
 
+from fba.speech._mouth_cues import OCULUS
 from fba.speech._sounds import Shape
-from fba.speech._timings import OCULUS, PHONES
+from fba.speech._timings import PHONES
 
 _NAMES = {number: name for name, number in reversed(OCULUS.items())}
 

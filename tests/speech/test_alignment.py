@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.speech import SENTENCES, VOICES, add_noise, speak, start_errors, telephone, visemes
+from bench.speech import add_noise, start_errors, telephone, visemes
+from bench.spoken import FLITE, KNOWN, speak
 from fba.arrays import Int16
 from fba.audio import read_mono
 from fba.errors import FormatError, UnsupportedError
@@ -36,7 +37,7 @@ def spoken(voice: str, text: str, folder: Path) -> tuple[Int16, list[Phone]]:
 def test_phones_are_found_where_they_are_spoken(tmp_path: Path) -> None:
     """The first sentences of `bench.speech`, each of another voice; its table has all of them."""
     starts, with_text, without = [], [], []
-    for voice, text in zip(VOICES, SENTENCES, strict=False):
+    for voice, text in zip(FLITE, KNOWN, strict=False):
         sound, truth = spoken(voice, text, tmp_path)
         seconds = len(sound) / RATE
         true = visemes(find_shapes(truth), seconds)
@@ -55,21 +56,21 @@ def test_phones_are_found_where_they_are_spoken(tmp_path: Path) -> None:
 @needs_recogniser
 @needs_flite
 def test_noise_and_telephones_do_not_stop_it(tmp_path: Path) -> None:
-    sound, truth = spoken("slt", SENTENCES[1], tmp_path)
+    sound, truth = spoken("slt", KNOWN[1], tmp_path)
     true = visemes(find_shapes(truth), len(sound) / RATE)
     for change, least in ((add_noise, 0.6), (telephone, 0.75)):
-        found = find_speech([change(sound)], split_text(SENTENCES[1]))
+        found = find_speech([change(sound)], split_text(KNOWN[1]))
         assert np.mean(visemes(find_shapes(found.phones), len(sound) / RATE) == true) > least
 
 
 @needs_recogniser
 @needs_flite
 def test_a_text_that_does_not_fit_is_refused_with_the_words_that_are_missing(tmp_path: Path) -> None:
-    sound, _ = spoken("slt", SENTENCES[0], tmp_path)
+    sound, _ = spoken("slt", KNOWN[0], tmp_path)
     with pytest.raises(
         FormatError, match=r"does not fit the sound: \d+% of its 8 words.*missing are 'yesterday'"
     ):
-        find_speech([sound], split_text(SENTENCES[8])[:7] + split_text("indeed"))
+        find_speech([sound], split_text(KNOWN[8])[:7] + split_text("indeed"))
 
 
 @needs_recogniser
@@ -98,7 +99,7 @@ def test_a_text_that_is_longer_or_shorter_than_the_sound_says_where(tmp_path: Pa
 @needs_flite
 def test_long_sounds_are_aligned_in_pieces(tmp_path: Path) -> None:
     sounds, phones, at = [], [], 0.0
-    for text in SENTENCES:
+    for text in KNOWN:
         sound, truth = spoken("rms", text, tmp_path)
         sounds.append(sound)
         phones += [Phone(each.name, each.start + at, each.end + at) for each in truth]
@@ -106,7 +107,7 @@ def test_long_sounds_are_aligned_in_pieces(tmp_path: Path) -> None:
     whole = np.concatenate(sounds)
     assert len(whole) / RATE > 26
     times: list[float] = []
-    words = split_text(" ".join(SENTENCES))
+    words = split_text(" ".join(KNOWN))
     found = find_speech(np.array_split(whole, 50), words, progress=times.append)
     assert len(times) > 1
     assert times == sorted(times)

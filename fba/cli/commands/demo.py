@@ -33,6 +33,8 @@ SAMPLES = ("hello.bvh", "hello.fap")
 """A body and a face."""
 CAPTURE = "talk.c3d"
 """Markers on a face."""
+SOUND = "hello.wav"
+"""What they say."""
 TITLE = "fba demo"
 """Title of the window."""
 SECONDS_BEFORE_NOTICE = 4.0
@@ -52,9 +54,9 @@ def command(
 ) -> None:
     """Encode the samples, print their sizes, and play the first.
 
-    hello.bvh (a body) and hello.fap (a face) become one stream; talk.c3d (markers on a face) becomes
-    another. Scripts made them; they are not motion capture. Without a display, a film and a picture are
-    made instead. The sample files are copied into the folder.
+    hello.bvh (a body) and hello.fap (a face) become one stream, beside their voice, hello.wav; talk.c3d
+    (markers on a face) becomes another. Scripts made them, and a program speaks: nobody was captured.
+    Without a display, a film and a picture are made instead. The sample files are copied into the folder.
     """
     from fba.codec import probe_stream
     from fba.formats import merge, read
@@ -64,20 +66,20 @@ def command(
     folder.mkdir(parents=True, exist_ok=True)
     stream, video, picture = (folder / f"hello{suffix}" for suffix in (".fba", ".mp4", ".png"))
     sources = [folder / name for name in SAMPLES]
-    capture, talk = folder / CAPTURE, folder / "talk.fba"
-    made = (*sources, capture, stream, talk, video, picture)
+    capture, sound, talk = folder / CAPTURE, folder / SOUND, folder / "talk.fba"
+    made = (*sources, capture, sound, stream, talk, video, picture)
     outputs = Outputs([Output("--out", path) for path in made], no_clobber=no_clobber)
     surface = None if play is False else _open_window(asked=play is True)
     compiling = Timer(SECONDS_BEFORE_NOTICE, click.echo, [COMPILING], {"err": True})
     compiling.daemon = True
     compiling.start()
-    for source in (*sources, capture):
+    for source in (*sources, capture, sound):
         outputs.write(source, (files("fba") / "samples" / source.name).read_bytes())
     body, face = (read(source) for source in sources)
     source_bytes = sum(source.stat().st_size for source in sources)
     animation = merge(face, body.resample(face.rate))
     compiling.cancel()
-    click.echo(f"samples: {' and '.join(map(str, sources))}")
+    click.echo(f"samples: {' and '.join(map(str, sources))}, with {sound}")
     click.echo(
         f"animation: {seconds_text(animation.duration)}, body at {rate_text(body.rate)} and "
         f"face at {rate_text(face.rate)} frames/s, {source_bytes} bytes of text"
@@ -91,10 +93,10 @@ def command(
     )
     decoded = read(stream)
     click.echo(f"decoded: {len(decoded)} frames at {rate_text(decoded.rate)} frames/s")
-    shown = surface is not None and _play(decoded, surface, asked=play is True)
+    shown = surface is not None and _play(decoded, surface, sound, asked=play is True)
     _encode_capture(capture, talk, outputs)
     if not shown:
-        _render(decoded, video, picture)
+        _render(decoded, video, picture, sound)
     quoted = shlex.quote(str(stream))
     if shown or (play is False and _can_open_a_window()):
         click.echo(f"to see it again: {as_typed(f'fba play {quoted}')}")
@@ -131,14 +133,16 @@ def _open_window(*, asked: bool) -> Surface | None:
     return surface
 
 
-def _play(animation: Animation, surface: Surface, *, asked: bool) -> bool:
+def _play(animation: Animation, surface: Surface, sound: Path, *, asked: bool) -> bool:
     """Play an animation, then the files dropped onto the window; return whether that was possible."""
     from fba import player
     from fba.formats import read
 
     with surface:
         try:
-            dropped = player.play(animation, title=TITLE, surface=surface, life=True, from_face=True)
+            dropped = player.play(
+                animation, title=TITLE, surface=surface, audio=sound, life=True, from_face=True
+            )
             while dropped:
                 file = dropped[0]
                 dropped = player.play(read(file), title=file.name, file=file, surface=surface)
@@ -164,13 +168,13 @@ def _can_open_a_window() -> bool:
     return True
 
 
-def _render(animation: Animation, video: Path, picture: Path) -> None:
+def _render(animation: Animation, video: Path, picture: Path, sound: Path) -> None:
     from fba import player
 
     player.render(animation, picture, time=float(animation.times[0]) + 2.0)
     try:
         with Progress("rendering", None) as step:
-            player.render(animation, video, size=(640, 360), progress=step.show)
+            player.render(animation, video, size=(640, 360), audio=sound, progress=step.show)
     except DisplayError as error:  # films need more than pictures
         click.echo(f"rendered: {picture}; no film: {error}")
     else:
