@@ -283,7 +283,7 @@ def _fit_tables(
             size = np.abs(fitted).max(axis=(1, 2), initial=0.0)
             fitted[size <= LEAST_MOTION * size.max(initial=0.0)] = 0.0
             if table.fap not in TURNING_FAPS:
-                _unfold(fitted, _limits(model, table.fap, mesh), places, corners[own], fixed)
+                unfold_motion(fitted, interval_limits(model, table.fap, mesh), places, corners[own], fixed)
             here = fitted[point[rows]]
             moved = np.flatnonzero(here.any(axis=(1, 2))).astype(np.int32)
             meshes.append(FaceDefMesh(mesh.part, mesh.borders, moved, here[moved]))
@@ -291,7 +291,7 @@ def _fit_tables(
     return tuple(tables)
 
 
-def _limits(model: FaceModel, fap: int, mesh: FaceDefMesh) -> Float64:
+def interval_limits(model: FaceModel, fap: int, mesh: FaceDefMesh) -> Float64:
     """Return (L, K - 1): how far a FAP goes along each interval at the ends of its range, times FAPU."""
     entry = faps()[fap - 1]
     ends = [limit * entry.step for limit in entry.i_limits or () if limit]
@@ -299,33 +299,34 @@ def _limits(model: FaceModel, fap: int, mesh: FaceDefMesh) -> Float64:
     return np.array(lengths, dtype=np.float64).reshape(-1, len(mesh.borders) - 1) * model.fapu.of_fap(fap)
 
 
-def _unfold(moves: Float64, limits: Float64, places: Float64, corners: Int32, fixed: Int32) -> None:
+def unfold_motion(moves: Float64, limits: Float64, places: Float64, corners: Int32, fixed: Int32) -> None:
     """Even out motions (P, K - 1, 3), in place, that turn triangles over at a FAP's limits (L, K - 1).
 
     places: (P, 3), at rest. corners: (F, 3). fixed: points whose motion stays. What is left folded after
     `MAX_ROUNDS` stays so.
     """
     moving: Bool = np.abs(moves).max(axis=(1, 2), initial=0.0) > 0
-    corners = corners[moving[corners].any(axis=1)]
+    used, near = np.unique(corners[moving[corners].any(axis=1)], return_inverse=True)
+    corners = near.reshape(-1, 3).astype(np.int32)
+    own, places, pinned = moves[used], places[used], np.isin(used, fixed)
     before = _normals(places, corners)
     square = (before**2).sum(axis=1)
-    kept = moves[fixed].copy()
     for _ in range(MAX_ROUNDS):
         over = np.zeros(len(corners), dtype=bool)
         for limit in limits:
-            after = _normals(places + np.einsum("k,pkd->pd", limit, moves), corners)
+            after = _normals(places + np.einsum("k,pkd->pd", limit, own), corners)
             over |= (before * after).sum(axis=1) < LEAST_AREA * square
         if not over.any():
-            return
+            break
         # each triangle that turns over moves more like one piece
-        sums, counts = np.zeros_like(moves), np.zeros(len(places))
-        means = moves[corners[over]].mean(axis=1)
+        sums, counts = np.zeros_like(own), np.zeros(len(places))
+        means = own[corners[over]].mean(axis=1)
         for k in range(3):
             np.add.at(sums, corners[over, k], means)
             np.add.at(counts, corners[over, k], 1.0)
-        chosen = counts > 0
-        moves[chosen] += 0.7 * (sums[chosen] / counts[chosen, None, None] - moves[chosen])
-        moves[fixed] = kept
+        chosen = (counts > 0) & ~pinned
+        own[chosen] += 0.7 * (sums[chosen] / counts[chosen, None, None] - own[chosen])
+    moves[used] = own
 
 
 def _normals(places: Float64, corners: Int32) -> Float64:
