@@ -64,6 +64,26 @@ def faces() -> UInt8:
     return strip(found)
 
 
+def figures() -> UInt8:
+    """The figures that come with the library: faces at rest and glad, and as they stand in the sample."""
+    animation = performance()
+    rows = []
+    for name in fba.figures.FIGURES:
+        face, body = fba.figures.face(name), fba.figures.body(name)
+        head = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)), face)
+        whole = player.Scene(animation, face, body=body)
+        glad = head.model.definitions.expressions[1]
+        shown = []
+        with player.Offscreen(head, (360, 400), samples=4) as view:
+            for camera, faps in (("three-quarter", glad * 0), ("profile", glad * 0), ("front", glad)):
+                view.camera = head.camera(camera, 360 / 400)
+                shown.append(view.still(faps))
+        with player.Offscreen(whole, (360, 400), "body", samples=4) as view:
+            shown.append(view.frame(SWITCHED))
+        rows.append(strip(shown))
+    return np.concatenate(rows)
+
+
 def fitted() -> Image.Image:
     """The built-in head, fitted to a broad person, to a child, and to the points of docs/calibrate.md."""
     head = FaceModel.default()

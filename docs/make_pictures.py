@@ -36,6 +36,7 @@ PICTURES = {
     "expressions.jpg": "make_head_pictures.expressions",
     "faces.jpg": "make_head_pictures.faces",
     "faps.jpg": "make_head_pictures.faps",
+    "figures.jpg": "make_head_pictures.figures",
     "find.png": "make_find_picture.main",
     "fitted.jpg": "make_head_pictures.fitted",
     "gait.jpg": "make_gait_pictures.main",

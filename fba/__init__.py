@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from fba import archive as archive
     from fba import audio as audio
-    from fba import body, capture, emotion, face
+    from fba import body, capture, emotion, face, figures
     from fba import carriage as carriage
     from fba import codec as codec
     from fba import formats as formats
@@ -63,7 +63,7 @@ _NAMES = {
 }  # fmt: skip
 """Public names by the module that they are imported from."""
 _MODULES = (
-    "archive", "audio", "body", "capture", "carriage", "codec", "emotion", "face", "formats", "live",
+    "archive", "audio", "body", "capture", "carriage", "codec", "emotion", "face", "figures", "formats", "live",
     "outlines", "parameters", "persona", "planning", "player", "serving", "speech",
 )  # fmt: skip
 

@@ -64,6 +64,7 @@ fba.body.skin
 fba.body
 fba.body.simplification
 fba.body.builtin
+fba.figures
 fba.body.gait
 fba.body.importers
 fba.planning

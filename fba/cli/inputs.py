@@ -264,19 +264,32 @@ def check_capture_options(given: Mapping[str, str], files: Iterable[Path], readi
             raise click.UsageError(f"{flag} is for {takers}, not for {names}")
 
 
-def read_model(path: Path | None) -> FaceModel | None:
-    """Return the face of `--model`, or None for the built-in head."""
+def read_model(path: Path | None, figure: str | None = None) -> FaceModel | None:
+    """Return the face of `--model`, else of `--figure`, or None for the built-in head."""
     if path is None:
-        return None
+        if figure is None:
+            return None
+        from fba import figures
+
+        return figures.face(figure)
     from fba.face.importers import import_model
 
     return import_model(path)
 
 
-def read_body(path: Path | None, joints: Mapping[str, str] | None = None) -> BodyModel | None:
-    """Return the body of `--body`, or None for the built-in person. joints: see `from_skeleton`."""
+def read_body(
+    path: Path | None, joints: Mapping[str, str] | None = None, figure: str | None = None
+) -> BodyModel | None:
+    """Return the body of `--body`, else of `--figure`, or None for the built-in person.
+
+    joints: see `from_skeleton`.
+    """
     if path is None:
-        return None
+        if figure is None:
+            return None
+        from fba import figures
+
+        return figures.body(figure)
     from fba.formats.gltf.bodies import import_body
 
     return import_body(path, joints=joints)

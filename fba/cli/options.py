@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -185,6 +185,14 @@ def model_option(text: str, *flags: str) -> Any:
     return option(*flags, type=ExistingPath(), metavar="FILE", help=text)
 
 
+Figure = Literal["alex", "ruth"]
+"""The figures that come with the library, `fba.figures.FIGURES`."""
+figure_option = option(
+    default=None,
+    help="A figure that comes with fba: alex, a young man (the built-in person), or ruth, a woman of about "
+    "sixty-five. --model and --body replace its face and its body.",
+)
+"""`--figure`."""
 format_option = option(
     "--from",
     metavar="FORMAT",

@@ -79,6 +79,7 @@ class SceneOptions(Reading):
         help="With --body: which joint of the standard a joint of its skeleton is, Pelvis=HumanoidRoot; "
         "none: Hat=. Repeatable. Or a TOML file of such pairs.",
     )
+    figure: options.Figure | None = options.figure_option
     arrange: Literal["side", "over", "colour", "wipe"] | None = option(
         help="Several files: side by side (default); the others as drawings over the first; side by side, "
         "coloured by their distance from the first; or two in one place, on either side of a line (wipe)."
@@ -234,7 +235,8 @@ def build_scene(
 ) -> Any:
     """Return one scene of animations. over: draw them over each other, without `--arrange`."""
     joints = read_body_joints(how.maps, how.body, how.limit)
-    face, figure = inputs.read_model(how.model), inputs.read_body(how.body, joints)
+    face = inputs.read_model(how.model, how.figure)
+    figure = inputs.read_body(how.body, joints, how.figure)
     scenes = [_build_one(animation, face, figure, how) for animation in animations]
     result: Any = scenes[0]
     if len(scenes) > 1:

@@ -6,21 +6,21 @@ import numpy as np
 from meshes import Mesh, tube
 
 from fba.arrays import Float64, Int64
+from looks import Colour
 
 AROUND = 40
 SCLERA = np.array([0.80, 0.76, 0.72])
 """Linear light."""
 LIMBUS = np.array([0.055, 0.050, 0.045])
-IRIS_INNER = np.array([0.30, 0.17, 0.065])
-IRIS_OUTER = np.array([0.115, 0.135, 0.105])
 PUPIL = np.array([0.004, 0.004, 0.004])
 VEIN = np.array([0.62, 0.30, 0.26])
 
 
-def eyeball(centre: Float64, radius: float, iris: float) -> Mesh:
+def eyeball(centre: Float64, radius: float, iris: float, tones: tuple[Colour, Colour]) -> Mesh:
     """Return an eyeball looking along +z.
 
-    The first vertex is the middle of the pupil. iris: its diameter; the pupil's is a third of it.
+    The first vertex is the middle of the pupil. iris: its diameter; the pupil's is a third of it. tones: inner
+    and outer colour of the iris.
     """
     edge, pupil = np.arcsin(iris / 2 / radius), np.arcsin(iris / 6 / radius)
     polar = np.concatenate([
@@ -33,7 +33,7 @@ def eyeball(centre: Float64, radius: float, iris: float) -> Mesh:
     ), axis=-1)  # fmt: skip
     unit = np.concatenate([[[0, 0, 1.0]], ring.reshape(-1, 3), [[0, 0, -1.0]]])
     triangles = _sphere(len(polar))
-    colours = _colours(polar, turn, pupil, edge).reshape(-1, 4)
+    colours = _colours(polar, turn, (pupil, edge), tones).reshape(-1, 4)
     first, last = np.append(PUPIL, 0.9)[None], np.append(VEIN * 0.6, 0.9)[None]
     return centre + unit * radius, triangles, np.concatenate([first, colours, last])
 
@@ -46,12 +46,18 @@ def _sphere(rings: int) -> Int64:
     return np.concatenate([cap, 1 + tube(rings, AROUND), end])
 
 
-def _colours(polar: Float64, turn: Float64, pupil: float, edge: float) -> Float64:
+def _colours(
+    polar: Float64, turn: Float64, rims: tuple[float, float], tones: tuple[Colour, Colour]
+) -> Float64:
+    """Return (R, N, 4) colours at angles from the gaze (R,) and around it (N,). rims: of pupil and iris."""
+    pupil, edge = rims
+    inner, outer = np.array(tones)
     random = np.random.default_rng(3)
     depth = np.clip((polar - pupil) / (edge - pupil), 0, 1)[:, None, None]
     streak = 0.75 + 0.5 * random.random((1, len(turn), 1)) * (1 - 0.5 * depth)
-    iris = (IRIS_INNER * (1 - depth) ** 1.6 + IRIS_OUTER * (1 - (1 - depth) ** 1.6)) * streak
-    iris = iris * (1 - depth**6) + LIMBUS * depth**6
+    near = np.clip(1 - 1.6 * depth, 0, 1) ** 1.5
+    iris = (inner * near + outer * (1 - near)) * streak
+    iris = iris * (1 - depth**12) + LIMBUS * depth**12
     away = np.clip((polar - edge) / 0.09, 0, 1)[:, None, None]
     back = np.clip((polar - 0.9) / 0.9, 0, 1)[:, None, None]
     white = LIMBUS * (1 - away) ** 2 + SCLERA * (1 - (1 - away) ** 2)

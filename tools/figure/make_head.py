@@ -29,17 +29,24 @@ from fba.arrays import Float64, Int32
 from fba.face import FaceModel, Material, Part, compact
 from fba.face.authoring import author
 from fba.mesh import vertex_normals
+from fba.parameters import point_rows
 from fba.sampling import smoothstep
+from hair import grow, scalp
+from looks import ALEX, Looks, reshape
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
 TEETH = np.array([0.0, -0.0713, 0.0823])
 """Point at which the edges of the middle incisors meet."""
+BEHIND = 0.012
+"""Metres from there to the middle of the lips."""
+ABOVE = 0.0005
+"""Metres from the top of the hair up to its feature point."""
 TONGUE = TEETH + np.array([0.0, 0.0002, -0.0022])
 
 
 def make_skin() -> tuple[Refined, sculpt.Marks]:
-    """Return the refined skin in the final frame, and its marks."""
+    """Return the refined skin in the final frame, without hair, and its marks."""
     base = figure.head()
     coarse = sculpt.find_marks(base)
     formed = sculpt.sculpt_head(base, coarse)
@@ -52,8 +59,6 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
     refined = refine(formed, outside & (eyes | lips | (y > 0.03)))
     marks = sculpt.refine_marks(refined, coarse)
     vertices = sculpt.press_lips(sculpt.lay_on_eyeballs(refined.vertices, marks.eye), marks) - ORIGIN
-    normals = vertex_normals(vertices, refined.triangles)
-    vertices = vertices + normals * (paint.THICKNESS * paint.scalp(vertices, 0.012))[:, None]
     return replace(refined, vertices=symmetrise(vertices)), marks
 
 
@@ -67,9 +72,9 @@ def symmetrise(vertices: Float64) -> Float64:
     return (vertices + vertices[mate] * (-1.0, 1.0, 1.0)) / 2
 
 
-def make_inner_parts() -> tuple[dict[str, Mesh], dict[str, int]]:
+def make_inner_parts(looks: Looks) -> tuple[dict[str, Mesh], dict[str, int]]:
     """Return eyes, teeth and tongue in the final frame, and the vertices of their feature points."""
-    ball = eyeballs.eyeball(EYE_CENTRE, EYE_RADIUS, IRIS)
+    ball = eyeballs.eyeball(EYE_CENTRE, EYE_RADIUS, IRIS, looks.iris)
     upper, upper_points = mouth.teeth(TEETH, upper=True)
     lower, lower_points = mouth.teeth(TEETH, upper=False)
     tongue, tongue_points = mouth.tongue(TONGUE)
@@ -92,30 +97,46 @@ KINDS = {
 ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.95}
 
 
-def parts_and_points(*, painted: bool = True) -> tuple[tuple[Part, ...], Float64, Int32]:
-    """Return parts, feature points (84, 3) and bound vertices (84,): the head without its tables.
+def parts_and_points(
+    looks: Looks = ALEX, *, painted: bool = True
+) -> tuple[tuple[Part, ...], Float64, Int32]:
+    """Return parts, feature points (84, 3) and bound vertices (84,): a figure's head without its tables.
 
     painted: whether to paint the texture of the skin, which takes most of the time.
     """
     surface, marks = make_skin()
-    meshes, inner_points = make_inner_parts()
-    parts = [_skin_part(surface, marks, painted)]
+    meshes, inner_points = make_inner_parts(looks)
+    parts = [_skin_part(surface, marks, looks, painted)]
     meshes |= _lashes(surface, marks)
-    meshes["shirt"] = garment.make_shirt(ORIGIN)
+    vertices, triangles, colours = garment.make_shirt(ORIGIN)
+    meshes["shirt"] = vertices, triangles, colours * (*looks.shirt, 1.0)
     for name, (vertices, triangles, colours) in meshes.items():
+        vertices = _reshape_part(looks, name, vertices)
         material = Material(KINDS[name], (1.0, 1.0, 1.0), ROUGHNESS[KINDS[name]])
         parts.append(Part(name, KINDS[name], vertices, triangles, colours=colours, material=material))
     starts = dict(
         zip([p.name for p in parts], np.cumsum([0, *(len(p.vertices) for p in parts)]), strict=False)
     )
     points, bound = landmarks.bound_points(surface, marks, inner_points, starts)
+    points = reshape(looks, points)
     for row in np.flatnonzero(bound >= 0):
         points[row] = np.concatenate([p.vertices for p in parts])[bound[row]]
+    hair_top = point_rows()["11.5"]
+    points[hair_top, 1] = parts[0].vertices[:, 1].max() + ABOVE
     return tuple(parts), points, bound
 
 
-def _skin_part(surface: Refined, marks: sculpt.Marks, painted: bool) -> Part:
-    """Return the skin, its vertices doubled along the seam of the texture."""
+def _reshape_part(looks: Looks, name: str, vertices: Float64) -> Float64:
+    """Return vertices of a part other than the skin in the figure's shape; teeth and tongue as a whole."""
+    if KINDS[name] in ("teeth", "tongue"):
+        lips = np.array([[0.0, TEETH[1] - ORIGIN[1], TEETH[2] - ORIGIN[2] + BEHIND]])
+        return vertices + reshape(looks, lips) - lips
+    return reshape(looks, vertices)
+
+
+def _skin_part(surface: Refined, marks: sculpt.Marks, looks: Looks, painted: bool) -> Part:
+    """Return the skin with its hair, its vertices doubled along the seam of the texture."""
+    whole = reshape(looks, grow(surface.vertices, looks.hair))
     pairs = np.stack([surface.triangles.ravel(), surface.corners.ravel()], axis=1)
     inner = np.repeat(surface.uvs[surface.corners].mean(axis=1)[:, 0] >= 1.0, 3)
     pairs[inner, 1] = -1  # inside of mouth and eyes: no texture of its own
@@ -128,7 +149,7 @@ def _skin_part(surface: Refined, marks: sculpt.Marks, painted: bool) -> Part:
     unique = np.unique(extra, axis=0)
     number = {tuple(pair): len(surface.vertices) + k for k, pair in enumerate(unique.tolist())}
     flat = [vertex if uv == first[vertex] else number[vertex, uv] for vertex, uv in pairs.tolist()]
-    vertices = np.concatenate([surface.vertices, surface.vertices[unique[:, 0]]])
+    vertices = np.concatenate([whole, whole[unique[:, 0]]])
     uv_rows = np.concatenate([first, unique[:, 1]])
     source = np.concatenate([np.arange(len(surface.vertices)), unique[:, 0]])
     # Insides take the colour of their border: of the lips, or of the corners of the eyes.
@@ -139,7 +160,7 @@ def _skin_part(surface: Refined, marks: sculpt.Marks, painted: bool) -> Part:
     texcoords = np.where(uv_rows[:, None] >= 0, surface.uvs[uv_rows], inner_uv)
     texcoords = np.stack([texcoords[:, 0], 1 - texcoords[:, 1]], axis=1)
     triangles = np.array(flat).reshape(-1, 3)
-    texture = paint.encode_jpeg(paint.paint(_chart(surface, marks))) if painted else None
+    texture = paint.encode_jpeg(paint.paint(_chart(surface, marks), looks)) if painted else None
     return Part(
         "skin", "skin", vertices, triangles,
         texcoords=texcoords, colours=_finish(surface, marks)[source],
@@ -162,7 +183,7 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     wet = np.where(near, 1 - smoothstep((ring - 0.5) / 2.0), 0.0)
     lips = np.where(near, 1 - smoothstep((ring - 3.5) / 2.0), 0.0)
     lids = np.where((eye != sculpt.FAR) & (eye <= 2.6), 1.0, 0.0)
-    cropped = paint.scalp(surface.vertices, 0.01)
+    cropped = scalp(surface.vertices, 0.01)
     y, z = surface.vertices[:, 1], surface.vertices[:, 2]
     oily = 1 - smoothstep(np.abs(surface.vertices[:, 0]) / 0.03)
     oily = oily * smoothstep((z + 0.01) / 0.02) * smoothstep((y + 0.05) / 0.03)
@@ -211,9 +232,12 @@ def head() -> FaceModel:
 
 
 if __name__ == "__main__":
+    import make_figures  # which imports this module
+
     made = head()
     made.save(TARGET)
     print(
         f"{TARGET}: {len(made.vertices)} vertices, {len(made.triangles)} triangles, {len(made.tables)} FAPs"
     )
     make_levels.main()
+    make_figures.main()

@@ -48,6 +48,7 @@ class _Look:
         metavar="JOINT=JOINT|FILE",
         help="With --body: which joint of the standard a joint of its skeleton is. Repeatable.",
     )
+    figure: options.Figure | None = options.figure_option
     title: str = option(
         default="", metavar="TEXT", help="Title of the page. Default: the names of the files."
     )
@@ -113,13 +114,14 @@ def command(
         if not len(each.animation):
             raise FormatError("holds no frames; a page needs one", path=file)
     joints = read_body_joints(look.maps, look.body, reading.limit)
+    with_body = any(each.animation.body is not None for each in read)
     from fba_player.export.page import make_page
 
     page = make_page(
         [_stream(each, name) for each, name in zip(read, names, strict=True)],
-        model=inputs.read_model(look.model),
-        body=inputs.read_body(look.body, joints),
-        with_body=any(each.animation.body is not None for each in read),
+        model=inputs.read_model(look.model, look.figure),
+        body=inputs.read_body(look.body, joints, look.figure if with_body else None),
+        with_body=with_body,
         with_head=any(each.animation.body is None for each in read),
         audio=audio,
         audio_offset=scenes.find_offset(audio, files, sound),
@@ -140,7 +142,8 @@ def _write_figure(
     joints = read_body_joints(look.maps, look.body, limits)
     from fba_player.export.page import pack_figure
 
-    data = pack_figure(inputs.read_model(look.model), inputs.read_body(look.body, joints))
+    model = inputs.read_model(look.model, look.figure)
+    data = pack_figure(model, inputs.read_body(look.body, joints, look.figure))
     outputs.write(output, data)
     outputs.say(f"{display_name(output)}: {len(data):,} bytes")
 

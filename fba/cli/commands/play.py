@@ -191,7 +191,8 @@ def _puppet(how: SceneOptions, shown: _Shown) -> tuple[Path, ...]:
     from fba import player
     from fba_player.session.performer import neutral
 
-    title = " ".join(file.name for file in (how.model, how.body) if file is not None) or "puppet"
+    given = [file.name for file in (how.model, how.body) if file is not None]
+    title = " ".join(filter(None, [how.figure, *given])) or "puppet"
     person = how.body is not None or how.model is None
     return player.play(
         lambda: scenes.build_scene([neutral(body=person)], [title], how),

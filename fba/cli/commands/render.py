@@ -173,10 +173,10 @@ def _check_still(request: _Request, given: list[str]) -> None:
         raise click.UsageError(f"--contact-sheet {request.sheet} shows frames of a file: give one")
     if how.body is not None and how.model is None and not given:
         raise click.UsageError("--body goes with a file, which says how the body moves")
-    if not given and how.model is None:
+    if not given and how.model is None and how.figure is None:
         raise click.UsageError(
-            "give a file, or a face by --fap, --viseme, --expression or --contact-sheet; a --model alone "
-            "is shown at rest"
+            "give a file, or a face by --fap, --viseme, --expression or --contact-sheet; a --model or "
+            "--figure alone is shown at rest"
         )
     moments = {f"--{name}": value for name, value in asdict(moment).items()}
     for name, value in {**moments, "--fps": request.rate, "--audio": request.sound.audio}.items():
@@ -313,6 +313,8 @@ def _sheet(request: _Request, output: Path, scene: Showable | None = None) -> st
                 scene, sheet, tile=size, camera=camera, start=moment.start, end=moment.end, progress=step.show
             )
         else:
-            pixels = contact_sheet(str(sheet), read_model(request.how.model), tile=request.size)
+            pixels = contact_sheet(
+                str(sheet), read_model(request.how.model, request.how.figure), tile=request.size
+            )
     write_picture(output, pixels)
     return f"{pixels.shape[1]}x{pixels.shape[0]}"

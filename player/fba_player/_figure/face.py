@@ -53,7 +53,7 @@ class Eyeball:
 
     rows: sampled vertices of the part, away from the pupil. neutral: their positions. lids: the model's
     vertices at `LID_POINTS`, -1 for missing ones. iris, pupil: diameters (m). step: change of the pupil's
-    diameter for one unit of FAP 29 or 30.
+    diameter for one unit of FAP 29 or 30. tint: colour of the iris, linear light, None for that of `Eye`.
     """
 
     side: int
@@ -65,6 +65,7 @@ class Eyeball:
     iris: float
     pupil: float
     step: float
+    tint: tuple[float, float, float] | None = None
 
     def pose(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
         """Return the eye for moved vertices (V, 3) of its part and of the face, put into the world."""
@@ -76,13 +77,14 @@ class Eyeball:
         frame[:3, 3] = centre
         pupil = self.pupil + self.step * float(faps[PUPIL_FAPS[self.side] - 1])
         iris = self.iris / 2 / self.radius
-        return Eye(
+        eye = Eye(
             matrix @ frame,
             iris,
             min(max(pupil / 2 / self.radius, 0.03), iris * 0.92),
             self._lid_positions(face, centre),
             matrix[:3, :3] / math.sqrt(matrix[:3, 0] @ matrix[:3, 0]),
         )
+        return eye if self.tint is None else replace(eye, tint=self.tint)
 
     def _lid_positions(self, face: Float32, centre: Float64) -> Float64:
         """Return the lid points (4, 3) from the centre, in radii; for missing ones, those of an open eye."""
@@ -111,7 +113,18 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED_VERTICES).astype(int))]
     unit = model.fapu.IRISD
     lids = tuple(int(model.bound[point_rows()[name]]) for name in LID_POINTS[side])
-    return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit)
+    tint = _iris_tint(part, centre, unit * 512)
+    return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit, tint)
+
+
+def _iris_tint(part: Part, centre: Float64, radius: float) -> tuple[float, float, float] | None:
+    """Return the mean colour of the outer part of an iris of a radius (m); None where vertices have none."""
+    across = np.hypot(*(part.vertices - centre)[:, :2].T)
+    ring = (across > 0.72 * radius) & (across < 0.94 * radius) & (part.vertices[:, 2] > centre[2])
+    if part.colours is None or part.material.texture is not None or not ring.any():
+        return None
+    red, green, blue = part.colours[ring, :3].mean(axis=0, dtype=np.float64)
+    return float(red), float(green), float(blue)
 
 
 @dataclass(frozen=True, eq=False)

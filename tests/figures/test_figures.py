@@ -1,0 +1,77 @@
+"""The figures that come with the library."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from fba import figures
+from fba.body import BodyModel
+from fba.cli.options import Figure
+from fba.errors import ModelError
+from fba.face import Deformer, FaceModel
+from fba.face.checks import check_faps, check_neutral
+from fba.parameters import FAP_COUNT
+
+OTHERS = [name for name in figures.FIGURES if name != "alex"]
+
+
+def test_the_command_line_offers_them_all() -> None:
+    assert get_args(Figure) == tuple(figures.FIGURES)
+
+
+def test_the_first_is_the_built_in_person() -> None:
+    assert figures.face() is FaceModel.default()
+    assert figures.body("alex") is BodyModel.default()
+
+
+def test_an_unknown_name_says_which_there_are() -> None:
+    for read in (figures.face, figures.body):
+        with pytest.raises(ModelError, match="'rut'.*alex, ruth"):
+            read("rut")
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_the_faces_keep_the_standard(name: str) -> None:
+    face = figures.face(name)
+    assert figures.face(name) is face
+    assert not face.lost
+    assert set(face.table_of) == set(FaceModel.default().table_of)
+    findings = [*check_neutral(face), *check_faps(face)]
+    assert not [finding for finding in findings if finding.severity == "error"]
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_levels_of_detail_come_along(name: str) -> None:
+    face = figures.face(name)
+    assert len(face.levels) == len(FaceModel.default().levels) > 0
+    values = np.zeros((1, FAP_COUNT), np.float32)
+    whole = Deformer(face)(values)[0]
+    for level in face.levels:
+        away = np.linalg.norm(level.model.vertices[level.parents] - whole, axis=1)
+        assert np.median(away) < 0.004
+        assert level.model.part("skin").material.texture == face.part("skin").material.texture
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_the_head_fits_the_neck_of_its_body(name: str) -> None:
+    face, body = figures.face(name), figures.body(name)
+    default = FaceModel.default(), BodyModel.default()
+    gaps = []
+    for head, trunk in ((face, body), default):
+        assert trunk.eyes is not None
+        pupils = head.points[[head_row("3.5"), head_row("3.6")]]
+        placed = head.part("skin").vertices + (trunk.eyes - pupils).mean(axis=0)
+        neck = next(part for part in trunk.parts if part.kind == "neck").vertices
+        middle = neck[np.abs(neck[:, 1] - np.median(neck[:, 1])) < 0.01]
+        gaps.append(np.linalg.norm(placed[None] - middle[:, None], axis=2).min(axis=1).max())
+    assert gaps[0] < gaps[1] + 0.001
+    assert len(body.skeleton) == len(default[1].skeleton)
+
+
+def head_row(point: str) -> int:
+    from fba.parameters import point_rows
+
+    return point_rows()[point]

@@ -1,0 +1,118 @@
+"""How the built-in figures look: colours, hair and lines of the skin. Shapes are in `shapes.csv`."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fba.arrays import Float64
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Hair:
+    """Hair of the head, a layer over the scalp that is painted with strokes.
+
+    sides, top: its thickness at the sides and what the top adds, metres. rise: metres from the hairline over
+    which it reaches them. lumps: how far locks stand out, metres. curly: whether strokes lie in all directions,
+    else they are combed from a parting. stroke: shortest and longest stroke, metres. colours: of the strokes,
+    sRGB, 0..255, the first also of the layer below.
+    """
+
+    sides: float
+    top: float
+    rise: float
+    lumps: float
+    curly: bool
+    stroke: tuple[float, float]
+    colours: tuple[Colour, ...]
+
+
+@dataclass(frozen=True)
+class Looks:
+    """One figure. Colours of the skin are sRGB, 0..255; of eyes and clothes, linear light.
+
+    brow_height: of the brows, relative to the first figure's. lines: depth of the lines of an old skin, 0..1.
+    iris: inner and outer colour. shirt, trousers, shoes: factors of the first figure's colours.
+    """
+
+    name: str
+    hair: Hair
+    skin: Colour
+    blush: Colour
+    socket: Colour
+    neck: Colour
+    waterline: Colour
+    caruncle: Colour
+    lip: Colour
+    lip_line: Colour
+    freckle: Colour
+    scalp: Colour
+    brow: Colour
+    brow_height: float = 1.0
+    lines: float = 0.0
+    iris: tuple[Colour, Colour] = ((0.30, 0.17, 0.065), (0.075, 0.105, 0.100))
+    shirt: Colour = (1.0, 1.0, 1.0)
+    trousers: Colour = (1.0, 1.0, 1.0)
+    shoes: Colour = (1.0, 1.0, 1.0)
+
+
+ALEX = Looks(
+    name="alex",
+    hair=Hair(
+        0.0035, 0.0100, 0.014, 0.0, curly=False, stroke=(0.006, 0.013),
+        colours=((54, 39, 30), (82, 59, 43), (112, 82, 60), (36, 26, 21)),
+    ),
+    skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
+    waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(184, 104, 96), lip_line=(132, 62, 58),
+    freckle=(178, 118, 92), scalp=(112, 86, 73), brow=(52, 38, 30),
+)  # fmt: skip
+"""The built-in person: a young man with brown hair."""
+RUTH = Looks(
+    name="ruth",
+    hair=Hair(
+        0.017, 0.009, 0.020, 0.0022, curly=True, stroke=(0.0022, 0.0045),
+        colours=((98, 94, 92), (150, 147, 145), (190, 188, 186), (62, 58, 57)),
+    ),
+    skin=(128, 86, 66), blush=(132, 76, 62), socket=(94, 60, 48), neck=(120, 80, 61),
+    waterline=(150, 98, 86), caruncle=(186, 118, 108), lip=(128, 70, 64), lip_line=(78, 40, 36),
+    freckle=(92, 58, 42), scalp=(84, 66, 58), brow=(66, 56, 52), brow_height=0.72, lines=1.0,
+    iris=((0.080, 0.040, 0.018), (0.038, 0.021, 0.012)),
+    shirt=(3.0, 0.62, 0.45), trousers=(1.1, 0.75, 0.60), shoes=(0.8, 0.55, 0.45),
+)  # fmt: skip
+"""A woman of about sixty-five with brown skin and grey curls."""
+FIGURES = (ALEX, RUTH)
+EYES = np.array([[0.0310, 0.0, -0.0123], [-0.0310, 0.0, -0.0123]])
+"""About the centres of the eyeballs, in the finished head's frame: nothing moves there."""
+STILL, MOVING = 0.014, 0.022
+"""Metres from these up to which nothing moves, and from which on everything may."""
+
+
+def reshape(looks: Looks, positions: Float64) -> Float64:
+    """Return points (N, 3), in the finished head's frame, in the shape of another figure.
+
+    Each row of `shapes.csv` moves what is near a place, and stretches it about that place, on both sides.
+    """
+    from fba.sampling import smoothstep
+
+    moved = positions.copy()
+    away = np.linalg.norm(positions[:, None] - EYES, axis=2).min(axis=1)
+    free = smoothstep((away - STILL) / (MOVING - STILL))[:, None]
+    with (Path(__file__).parent / "shapes.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["figure"] == looks.name]
+    for row in rows:
+        place, shift, stretch = (np.array([float(row[c]) for c in names]) for names in COLUMNS)
+        for side in (1.0, -1.0) if place[0] else (1.0,):
+            mirror = np.array([side, 1.0, 1.0])
+            offset = positions - mirror * place / 1000
+            weight = np.exp(-((offset / (float(row["reach"]) / 1000)) ** 2).sum(axis=1))[:, None]
+            moved += free * weight * (mirror * shift / 1000 + offset * stretch)
+    return moved
+
+
+COLUMNS = (("x", "y", "z"), ("dx", "dy", "dz"), ("sx", "sy", "sz"))
+
