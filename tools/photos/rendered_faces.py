@@ -9,19 +9,25 @@ from dataclasses import replace
 
 import numpy as np
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
 from fba import Animation, FaceTrack, player
 from fba.arrays import Float64, UInt8
+from fba.emotion import expressions
 from fba.errors import FbaError, FbaWarning
-from fba.face import FaceModel
+from fba.face import Deformer, FaceModel
 from fba.face.calibration import fit
 from fba.face.fitting._points_file import HIDDEN
 from fba.face.fitting._views import face_covariance
 from fba.face.model import Part
 from fba.mesh import read_pixels
-from fba.parameters import point_rows
+from fba.parameters import fap_numbers, point_rows
 
-SIZE = (360, 440)
+SIZE = (320, 380)
+VIEWS = 6
+"""Pictures of each head."""
+HAIRY, BEARDED = 0.6, 0.25
+"""Shares of the pictures in which hair, which the built-in head has no mesh of, or a beard is painted."""
 DISTANCE = 1.5
 SKIN_RANGE = (0.25, 1.25)
 """Factors on the brightness of the built-in skin, from dark to pale."""
@@ -32,13 +38,14 @@ HAIR = 110
 
 
 def rendered_faces(count: int, seed: int) -> Iterator[tuple[UInt8, Float64]]:
-    """Yield pictures uint8 (H, W, 3) and the places (84, 2) of the feature points on them, pixels."""
+    """Yield pictures uint8 (H, W, 3) of each head, and the places (84, 2) of its feature points, pixels."""
     random = np.random.default_rng(seed)
     for _ in range(count):
         head = None
         while head is None:
             head = varied_head(random)
-        yield _photographed(head, random)
+        # The tables move a head of another shape about as far, which is good enough for a picture.
+        yield from _photographed(replace(head, tables=FaceModel.default().tables), random)
 
 
 def varied_head(random: np.random.Generator) -> FaceModel | None:
@@ -86,25 +93,81 @@ def _coloured(part: Part, random: np.random.Generator) -> Part:
     return replace(part, material=replace(part.material, texture=file.getvalue()))
 
 
-def _photographed(head: FaceModel, random: np.random.Generator) -> tuple[UInt8, Float64]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # it has no FAPs
-        scene = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)), model=head)
-    row = point_rows()
-    tip, pupil = head.points[row["9.3"]], head.points[row["3.5"]]
-    shift = random.uniform(-0.02, 0.02, 2)
-    camera = player.Camera(
-        target=(float(shift[0]), float(tip[1] + 0.01 + shift[1]), float(pupil[2] - 0.06)),
-        yaw=random.uniform(-12, 12), pitch=random.uniform(-12, 12), distance=DISTANCE,
-        field_of_view=2 * float(np.degrees(np.arctan(random.uniform(0.15, 0.2) / DISTANCE))),
-    )  # fmt: skip
+def _photographed(head: FaceModel, random: np.random.Generator) -> Iterator[tuple[UInt8, Float64]]:
+    """Yield pictures of a head from several sides, in other light and with other faces."""
+    scene = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)), model=head)
+    scene.show("background", "transparent")
+    deform, row = Deformer(head), point_rows()
+    friendly = [one.faps for one in expressions() if one.family == "joy"]
     with player.Offscreen(scene, SIZE, samples=2) as view:
-        view.camera = camera
-        pixels = view.still(np.zeros(68))[..., :3].astype(np.float64)
+        for k in range(VIEWS):
+            faps = friendly[int(random.integers(len(friendly)))] * (random.random() if k % 3 == 0 else 0.0)
+            light, nod = random.uniform(-80, 80), random.uniform(-20, 20)
+            faps[fap_numbers()["head_yaw"] - 1] = np.radians(light) * 1e5
+            faps[fap_numbers()["head_pitch"] - 1] = np.radians(nod) * 1e5
+            points = deform.feature_points(faps)
+            middle = points[[row[name] for name in ("3.5", "3.6", "9.3")]].mean(axis=0)
+            x, y, z = middle + np.append(random.uniform(-0.03, 0.03, 2), 0)
+            view.camera = player.Camera(
+                target=(float(x), float(y), float(z)), yaw=light + random.uniform(-15, 15),
+                pitch=random.uniform(-15, 15) - nod, distance=DISTANCE,
+                field_of_view=2 * float(np.degrees(np.arctan(random.uniform(0.14, 0.2) / DISTANCE))),
+            )  # fmt: skip
+            clip = np.column_stack([points, np.ones(len(points))]) @ view.camera.clip_matrix(SIZE).T
+            places = (clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5) * SIZE
+            yield _exposed(_with_surroundings(view.still(faps), places, random), random), places
+
+
+def _with_surroundings(pixels: UInt8, places: Float64, random: np.random.Generator) -> Float64:
+    """Return a picture (H, W, 4) with something behind the head, often hair or a beard, too: (H, W, 3)."""
+    row = point_rows()
+    opaque = pixels[..., 3:] / 255.0
+    face = pixels[..., :3].astype(np.float64)
+    across, down = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
+    right, left, chin, mouth = (places[row[name]] for name in ("3.6", "3.5", "2.1", "2.2"))
+    middle, eyes = (left + right) / 2, float(np.linalg.norm(left - right))
+    if random.random() < BEARDED:
+        low = 1 / (1 + np.exp(-(down - (mouth[1] - 0.35 * eyes) - _cloud(random, 40) * 0.1 * eyes) / 4))
+        lips = np.exp(-(((across - mouth[0]) / (0.42 * eyes)) ** 4) - ((down - mouth[1]) / (0.2 * eyes)) ** 4)
+        face *= 1 - (random.uniform(0.2, 0.8) * low * (1 - lips))[..., None]
+    result = _backdrop(random) * (1 - opaque) + face * opaque
+    if random.random() < HAIRY:  # what lies outside of an egg around the face, down to some height
+        wide, tall = random.uniform(1.0, 1.35) * eyes, random.uniform(1.1, 1.5) * eyes
+        far = np.hypot(
+            (across - middle[0]) / wide, (down - middle[1]) / np.where(down < middle[1], tall, 9 * eyes)
+        )
+        edge = 1 + 0.08 * _cloud(random, 6)
+        end = random.uniform(middle[1], chin[1] + eyes) + 4 * _cloud(random, 6)
+        hair = np.clip((far - edge) * 12, 0, 1) * (far < random.uniform(1.3, 2.2)) * (down < end)
+        strands = 1 + 0.15 * _cloud(random, 2) + 0.2 * _cloud(random, 12)
+        colour = random.uniform(10, 230) * (1 + 0.2 * random.standard_normal(3))
+        result += (strands[..., None] * colour - result) * hair[..., None]
+    return result
+
+
+def _backdrop(random: np.random.Generator) -> Float64:
+    """Return something to stand before: even, cloudy, or with edges (H, W, 3)."""
+    colours = random.uniform(0, 255, (3, 3))
+    strength = random.uniform(0, 1.0)
+    share = np.clip(0.5 + strength * _cloud(random, 40) + strength * 0.5 * _cloud(random, 5), 0, 1)
+    result = colours[0] * share[..., None] + colours[1] * (1 - share[..., None])
+    for _ in range(int(random.integers(0, 5))):
+        x, y = random.integers(0, SIZE[0]), random.integers(0, SIZE[1])
+        wide, high = random.integers(10, SIZE[0]), random.integers(10, SIZE[1])
+        result[y : y + high, x : x + wide] = random.uniform(0, 255, 3)
+    return np.asarray(result)
+
+
+def _cloud(random: np.random.Generator, reach: float) -> Float64:
+    """Return noise (H, W) of standard deviation 1 that is alike over some pixels."""
+    noise = gaussian_filter(random.standard_normal(SIZE[::-1]), reach, mode="wrap")
+    return np.asarray(noise / noise.std())
+
+
+def _exposed(pixels: Float64, random: np.random.Generator) -> UInt8:
+    """Return a picture in another light and exposure, blurred and with noise: uint8 (H, W, 3)."""
     across, down = np.meshgrid(np.linspace(-1, 1, SIZE[0]), np.linspace(-1, 1, SIZE[1]))
     ramp = 1 + random.uniform(-0.45, 0.45) * across + random.uniform(-0.3, 0.3) * down
-    lit = 255 * (np.clip(pixels / 255 * ramp[..., None], 0, 1) ** random.uniform(0.7, 1.5))
-    lit += random.normal(0, random.uniform(0, 6), lit.shape)
-    clip = np.column_stack([head.points, np.ones(len(head.points))]) @ camera.clip_matrix(SIZE).T
-    flat = clip[:, :2] / clip[:, 3:]
-    return np.clip(lit, 0, 255).astype(np.uint8), (flat * (0.5, -0.5) + 0.5) * SIZE
+    lit = 255 * (np.clip(pixels / 255 * ramp[..., None], 0, 1) ** random.uniform(0.6, 1.6))
+    lit = gaussian_filter(lit, (*[random.uniform(0, 1.5)] * 2, 0))
+    return np.clip(lit + random.normal(0, random.uniform(0, 8), lit.shape), 0, 255).astype(np.uint8)

@@ -1,8 +1,10 @@
-"""Features of faces: what the surroundings of each point look like, learned from rendered faces.
+"""What faces look like, learned from rendered ones: the whole face, and how its points are found.
 
-The steps are those of Karpouzis, section 7.3: regions by anthropometry, templates (normalised correlation),
-phases of Gabor filters in four directions, and eigenfeatures (distance from the space of the first two
-eigenvectors). `learn` makes them; `tools/photos/learn_features.py` runs it.
+The template of a whole face, with the distance from the space of its eigenvectors, is that of Karpouzis,
+section 7.3, and so are pupils by brightness. The other points come from a cascade of linear regressions on
+gradients (X. Xiong and F. De la Torre, "Supervised descent method", 2013): templates, Gabor phases and
+eigenfeatures of single points, his way, left them half as far off again.
+`tools/photos/learn_features.py` makes the data.
 """
 
 from __future__ import annotations
@@ -15,9 +17,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.signal import fftconvolve
 
-from fba.arrays import Float64, Floating, UInt8
-from fba.face.feature_points import MIRRORED
-from fba.parameters import point_rows
+from fba.arrays import Float32, Float64, Floating, UInt8
 
 EYES = 44.0
 """Pixels between the pupils in a face of standard size."""
@@ -25,66 +25,93 @@ FACE_SIZE = (200, 176)
 """Height and width of a face of standard size, pixels; the middle of the eyes is at `MIDDLE`."""
 MIDDLE = (88.0, 70.0)
 """x and y of the middle of the eyes in a face of standard size."""
-PATCH = 12
-"""Pixels from the middle of a template to its edge."""
-EIGENVECTORS = 2
 SMALL = 4.0
 """Factor by which the template of a whole face is smaller."""
 WHOLE = (14, 9, 20)
 """Beside, above and below the middle of the eyes: what the whole face's template shows, small pixels."""
-WHOLE_VECTORS = 4
-DIRECTIONS = 4
-WAVELENGTH = 11.0
-LOCAL = 14.0
-"""Pixels over which brightness and contrast are evened."""
-
 WHOLE_LOCAL = 28.0
-"""The same for the template of the whole face."""
-
-CENTRAL = ("9.3", "9.15", "8.1", "8.2", "2.2", "2.10", "2.1")
-LEFT = ("3.5", "3.7", "3.11", "3.1", "3.3", "4.1", "4.3", "4.5", "9.1", "8.3", "8.5", "8.7")
-POINTS = (*CENTRAL, *LEFT, *(MIRRORED[name] for name in LEFT))
-"""Points with a template of their own; those of the right side are mirror images."""
+"""Pixels over which brightness and contrast of a whole face are evened."""
+REACHES = (4.0, 2.0)
+"""Pixels over which gradients are summed, coarse and fine."""
+STAGES = (0, 0, 1, 1, 1)
+"""Reach, as a number in `REACHES`, of each regression of the cascade."""
+CELLS = 4
+"""Sums of gradients along each side of a square around a point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """What points look like, by name (C of them, central and left): see `learn`.
+    """What faces look like. P: points, those of `FRONT_POINTS`; D: numbers that describe all surroundings.
 
-    places, spreads: (C, 2), where points are in a face of standard size relative to the middle of the eyes,
-    and their standard deviation, pixels. means: (C, S, S), templates. vectors: (C, 2, S, S), eigenvectors.
-    phases: complex (C, 4), mean responses of Gabor filters, of length 1 where all faces agree. whole: (1 + 4,
-    H, W), the template of the whole small face and its eigenvectors.
+    mean: (P, 2), where points are in a face of standard size, pixels. weights: (5, D + 1, K), the
+    regressions of the cascade, the constant last; times scales (5, K). bases: (5, K, 2P), the shifts
+    of points that the K results stand for. likeness: (D + 1,), the regression of "is a face" (1) or not (-1).
+    whole: (1 + 4, H, W), the template of the whole small face and its eigenvectors.
     """
 
-    places: Float64
-    spreads: Float64
-    means: Float64
-    vectors: Float64
-    phases: np.ndarray
+    mean: Float64
+    weights: Float32
+    scales: Float32
+    bases: Float32
+    likeness: Float32
     whole: Float64
 
-    def of(self, name: str) -> tuple[int, bool]:
-        """Return the number of a point's feature, and whether it is its mirror image."""
-        names = (*CENTRAL, *LEFT)
-        if name in names:
-            return names.index(name), False
-        return names.index(next(left for left, right in MIRRORED.items() if right == name)), True
+    def follow(self, face: Float64, places: Float64, first: int = 0) -> tuple[Float64, float]:
+        """Return points (P, 2) found in a face of standard size from a guess, and their likeness to a face's.
 
-    def place(self, name: str) -> tuple[Float64, Float64]:
-        """Return a point's mean place from the middle of the eyes and its standard deviation, pixels (2,)."""
-        number, mirrored = self.of(name)
-        sign = np.array([-1.0 if mirrored else 1.0, 1.0])
-        return self.places[number] * sign, self.spreads[number]
+        first: number of the first regression; later ones see smaller surroundings.
+        """
+        gradients = [gradient_sums(face, reach) for reach in REACHES]
+        for stage in range(first, len(STAGES)):
+            seen = describe(gradients[STAGES[stage]], places, REACHES[STAGES[stage]])
+            results = (seen @ self.weights[stage, :-1] + self.weights[stage, -1]) * self.scales[stage]
+            places = places + (results @ self.bases[stage]).reshape(-1, 2)
+        seen = describe(gradients[-1], places, REACHES[-1])
+        return places, float(seen @ self.likeness[:-1] + self.likeness[-1])
 
 
 @cache
 def features() -> Features:
     """Return the features that come with the package."""
     with as_file(files(__package__) / "front_features.npz") as path, np.load(path) as content:
-        arrays = {name: content[name].astype(np.float64) for name in content.files if name != "phases"}
-        phases = content["phases"][..., 0].astype(float) + 1j * content["phases"][..., 1]
-    return Features(**arrays, phases=phases)
+        single = ("weights", "scales", "bases", "likeness")
+        return Features(
+            **{name: content[name].astype("f4" if name in single else "f8") for name in content.files}
+        )
+
+
+def gradient_sums(face: Float64, reach: float) -> Float32:
+    """Return sums (4, H, W) of gradients right, left, down and up around each pixel, contrast evened."""
+    down, right = np.gradient(gaussian_filter(face, reach / 2))
+    strength = np.sqrt(gaussian_filter(right**2 + down**2, 5 * reach)) + 0.002
+    parts = (right, -right, down, -down)
+    sums = [gaussian_filter(np.maximum(part, 0), 0.75 * reach) / strength for part in parts]
+    return np.array(sums, dtype=np.float32)
+
+
+def describe(sums: Float32, places: Float64, reach: float) -> Float32:
+    """Return the square roots of `gradient_sums` in a grid around places (P, 2): (4 * P * 16,)."""
+    steps = (np.arange(CELLS) - (CELLS - 1) / 2) * 2 * reach
+    cells = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    at = (places[:, None] + cells).reshape(-1, 2)
+    height, width = sums.shape[1:]
+    x, y = np.clip(at[:, 0], 0, width - 1.001), np.clip(at[:, 1], 0, height - 1.001)
+    i, j = x.astype(int), y.astype(int)
+    a, b = (x - i).astype(np.float32), (y - j).astype(np.float32)
+    above = sums[:, j, i] * (1 - a) + sums[:, j, i + 1] * a
+    below = sums[:, j + 1, i] * (1 - a) + sums[:, j + 1, i + 1] * a
+    return np.asarray(np.sqrt(above * (1 - b) + below * b).ravel())
+
+
+def standard_frame(places: Float64, mean: Float64) -> tuple[Float64, Float64]:
+    """Return (middle, across) of a face of standard size: the mean (P, 2) lies best on places (P, 2) in it.
+
+    By least squares over shift, turn and size; as `standard_face` takes them.
+    """
+    a, b = mean - mean.mean(axis=0), places - places.mean(axis=0)
+    right = np.array([(a * b).sum(), (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()]) / (a**2).sum()
+    x, y = np.array(MIDDLE) - mean.mean(axis=0)
+    return places.mean(axis=0) + x * right + y * np.array([-right[1], right[0]]), right * EYES
 
 
 def luminance(pixels: UInt8) -> Float64:
@@ -109,7 +136,12 @@ def standard_face(grey: Float64, middle: Float64, across: Float64) -> Float64:
     x, y = np.meshgrid(np.arange(width) - MIDDLE[0], np.arange(height) - MIDDLE[1])
     at = middle + x[..., None] * step + y[..., None] * down
     blur = max(float(np.hypot(*step)) - 1, 0) * 0.5
-    smooth = gaussian_filter(grey, blur) if blur > 0.2 else grey
+    corners = at.reshape(-1, 2)
+    low = np.clip(np.floor(corners.min(axis=0) - 4 * blur - 1), 0, np.array(grey.shape[::-1]) - 1).astype(int)
+    high = np.ceil(np.maximum(corners.max(axis=0) + 4 * blur + 2, low + 1)).astype(int)
+    near = grey[low[1] : high[1], low[0] : high[0]]
+    smooth = gaussian_filter(near, blur, mode="nearest") if blur > 0.2 else near
+    at = at - low
     return np.asarray(map_coordinates(smooth, [at[..., 1], at[..., 0]], order=1, mode="nearest"))
 
 
@@ -158,90 +190,7 @@ def subspace(picture: Float64, mean: Float64, vectors: Float64) -> tuple[Float64
     return along / max(np.sqrt(size), 1e-9), np.maximum(distance, 0.0)
 
 
-@cache
-def gabor_filters() -> np.ndarray:
-    """Return the complex Gabor filters (4, 25, 25): exp(-(x^2 + y^2) / 2 s^2) exp(j (u x + v y))."""
-    reach = int(WAVELENGTH)
-    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    bell = np.exp(-(x**2 + y**2) / (2 * (WAVELENGTH / 2.2) ** 2))
-    filters = []
-    for k in range(DIRECTIONS):
-        angle = np.pi * k / DIRECTIONS
-        wave = np.exp(2j * np.pi / WAVELENGTH * (np.cos(angle) * x + np.sin(angle) * y))
-        one = bell * (wave - (bell * wave).sum() / bell.sum())
-        filters.append(one / np.abs(one).sum())
-    return np.array(filters)
-
-
-def gabor(picture: Float64) -> np.ndarray:
-    """Return the complex responses (4, H, W) of Gabor filters in four directions."""
-    return np.array([fftconvolve(picture, one[::-1, ::-1], mode="same") for one in gabor_filters()])
-
-
-def phase_distance(responses: np.ndarray, phases: np.ndarray) -> Float64:
-    """Return how far the phases of responses (4, H, W) are from a prototype's (4,): 0 to 2, (H, W)."""
-    weight = np.abs(phases)[:, None, None] + 1e-9
-    unit = responses / (np.abs(responses) + 1e-4)
-    agree = (unit * (phases / (np.abs(phases) + 1e-9)).conj()[:, None, None]).real
-    return np.asarray(1 - (weight * agree).sum(axis=0) / weight.sum(axis=0))
-
-
-def mirror_phases(phases: np.ndarray) -> np.ndarray:
-    """Return the prototype (4,) of a feature's mirror image: waves across change direction, so do phases."""
-    result = phases.copy()
-    # The wave at an angle a runs, mirrored, at pi - a: cos changes its sign, which is the conjugate of -a.
-    result[0] = phases[0].conj()
-    for k in range(1, DIRECTIONS):
-        result[k] = phases[DIRECTIONS - k]
-    return result
-
-
-def learn(pictures: list[UInt8], points: Float64) -> dict[str, np.ndarray]:
-    """Return the arrays of `Features` from pictures of faces with known points (N, 84, 2), pixels."""
-    row = point_rows()
-    names = (*CENTRAL, *LEFT)
-    places: list[list[Float64]] = [[] for _ in names]
-    patches: list[list[Float64]] = [[] for _ in names]
-    waves: list[list[np.ndarray]] = [[] for _ in names]
-    wholes = []
-    for pixels, at in zip(pictures, points, strict=True):
-        grey = luminance(pixels)
-        for mirrored in (False, True):
-            here = grey[:, ::-1] if mirrored else grey
-            shown = at * (-1, 1) + (grey.shape[1] - 1, 0) if mirrored else at
-            first, second = (
-                (shown[row["3.6"]], shown[row["3.5"]]) if mirrored else (shown[row["3.5"]], shown[row["3.6"]])
-            )
-            middle, across = (first + second) / 2, first - second
-            plain = standard_face(here, middle, across)
-            face = even(plain, LOCAL)
-            responses = gabor(face)
-            wholes.append(_unit(_whole(even(plain, WHOLE_LOCAL))))
-            for number, name in enumerate(names):
-                seen = MIRRORED.get(name, name) if mirrored else name
-                place = to_standard(shown[row[seen]], middle, across)
-                places[number].append(place - MIDDLE)
-                patches[number].append(_unit(_cut(face, place)))
-                spot = [
-                    map_coordinates(one, [[place[1]], [place[0]]], order=1, mode="nearest")[0]
-                    for one in responses
-                ]
-                waves[number].append(np.array([z / (abs(z) + 1e-9) for z in spot]))
-    means = [np.mean(one, axis=0) for one in patches]
-    vectors = [_principal(np.array(one), EIGENVECTORS) for one in patches]
-    phases = np.array([np.mean(one, axis=0) for one in waves])
-    whole = np.concatenate([np.mean(wholes, axis=0)[None], _principal(np.array(wholes), WHOLE_VECTORS)])
-    return {
-        "places": np.array([np.mean(one, axis=0) for one in places], dtype=np.float32),
-        "spreads": np.array([np.std(one, axis=0) for one in places], dtype=np.float32),
-        "means": np.array(means, dtype=np.float16),
-        "vectors": np.array(vectors, dtype=np.float16),
-        "phases": np.stack([phases.real, phases.imag], axis=-1).astype(np.float32),
-        "whole": whole.astype(np.float16),
-    }
-
-
-def _whole(face: Float64) -> Float64:
+def whole_face(face: Float64) -> Float64:
     """Return the part of an evened face of standard size that the template of a whole face shows, small."""
     beside, above, below = WHOLE
     x = MIDDLE[0] + SMALL * np.arange(-beside, beside + 1)
@@ -250,22 +199,6 @@ def _whole(face: Float64) -> Float64:
     return np.asarray(map_coordinates(smooth, np.meshgrid(y, x, indexing="ij"), order=1, mode="nearest"))
 
 
-def _cut(face: Float64, place: Float64) -> Float64:
-    steps = np.arange(-PATCH, PATCH + 1)
-    return np.asarray(
-        map_coordinates(
-            face, np.meshgrid(place[1] + steps, place[0] + steps, indexing="ij"), order=1, mode="nearest"
-        )
-    )
-
-
-def _unit(patch: Float64) -> Float64:
+def unit(patch: Float64) -> Float64:
     off = patch - patch.mean()
     return np.asarray(off / max(float(np.linalg.norm(off)), 1e-9))
-
-
-def _principal(patches: Float64, count: int) -> Float64:
-    """Return the first eigenvectors (count, S, T) of the covariance of patches (N, S, T)."""
-    flat = patches.reshape(len(patches), -1)
-    _, _, vectors = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)
-    return np.asarray(vectors[:count].reshape(count, *patches.shape[1:]))

@@ -1,8 +1,7 @@
-"""`find_front_points`: the feature points of a face on a frontal photograph, the classical way.
+"""`find_front_points`: the feature points of a face on a frontal photograph.
 
-The whole face is found first; then, in a region for each point that anthropometry gives, the place whose
-surroundings are most like the point's; then the most likely head through all of these places, which corrects
-single mistakes; pupils, nostrils and brows last, by their brightness.
+The whole face is found first; then, from each place like one, a cascade of regressions moves the points of a
+mean face to where gradients around them say; pupils last, by their brightness.
 """
 
 from __future__ import annotations
@@ -14,72 +13,42 @@ from fba.arrays import Float64, UInt8
 from fba.errors import ModelError, warn
 from fba.face.fitting._features import (
     EYES,
-    LOCAL,
-    MIDDLE,
-    PATCH,
-    POINTS,
     SMALL,
     WHOLE,
     WHOLE_LOCAL,
     even,
     features,
     from_standard,
-    gabor,
     luminance,
-    mirror_phases,
-    phase_distance,
     standard_face,
+    standard_frame,
     subspace,
     to_standard,
 )
 from fba.face.fitting._found import FoundPoints, Step
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS
-from fba.face.fitting._views import Observation, first_view, solve
-from fba.parameters import point_rows
 
 LARGEST = 0.5
 """Largest distance between the pupils that is looked for, as a share of the picture's smaller side."""
-SMALLEST = 0.06
+SMALLEST = 0.035
 SIZES = 1.12
 """Ratio of successive sizes."""
-FACE_SCORE = 0.58
-"""Least likeness, 0 to 1, to the template of a whole face."""
+FACE_SCORE = 0.0
+"""Least likeness to a face; that of faces is about 1, of other things about -1."""
 CANDIDATES = 60
 """Places like a whole face whose points are looked at, at most."""
 OF_EACH_SIZE = 6
 LARGER = 0.05
 """Likeness that a face of twice the size has ahead: portraits show large faces."""
-SURE = (
-    "3.5",
-    "3.6",
-    "3.7",
-    "3.12",
-    "3.8",
-    "3.11",
-    "9.3",
-    "9.1",
-    "9.2",
-    "8.3",
-    "8.4",
-    "8.1",
-    "4.3",
-    "4.4",
-    "2.1",
-)
-"""Points that tell faces from other things."""
-SECOND_FACE = 0.93
-"""A second place as like a face as this share of the first's likeness may be another face."""
-REGION = 2.5
-"""Half width of a point's region, in standard deviations of its place in faces."""
-ROUNDS = ((1.0, 6.0), (0.5, 3.0), (0.35, 2.0))
-"""Of the search: share of the region, and least half width of it, pixels of a face of standard size."""
-GUESS_NOISE = 2.0
-"""Pixels of a face of standard size by which points are misplaced, beyond which they count less."""
-WEIGHTS = (1.0, 0.35, 0.25, 0.6)
-"""Of correlation, distance from the feature space, phase distance, and distance from the expected place."""
+SECOND_FACE = 0.5
+"""A second place with this likeness may be another face."""
+HARDLY_SEEN = ("2.13", "2.14", "10.9", "10.10", "10.5", "10.6", "11.1")
+"""Points that are moved with the others, but not proposed: too little tells where they are."""
 TURNS = (-12.0, 0.0, 12.0)
 """Degrees by which the picture is turned while the face is looked for."""
+PUPIL = 5
+"""Pixels of a face of standard size around a pupil in which it is looked for."""
 
 
 def find_front_points(photograph: Photograph) -> FoundPoints:
@@ -90,29 +59,22 @@ def find_front_points(photograph: Photograph) -> FoundPoints:
     grey = luminance(photograph.pixels)
     middle, across, score, where = _find_face(grey, photograph.name)
     steps = [Step("Where a whole face is most likely", where)]
-    places: dict[str, Float64] = {}
-    for turn, (share, least) in enumerate(ROUNDS):
-        face = even(standard_face(grey, middle, across), LOCAL)
-        expected = {name: to_standard(place, middle, across) for name, place in places.items()}
-        found, likeness = _search(face, expected, share, least)
-        if turn == 0:
-            steps.append(
-                Step("Regions by anthropometry and the most likely places", _draw(face, found, likeness))
-            )
-        spots = {name: from_standard(place, middle, across) for name, place in found.items()}
-        places, middle, across = _likely_head(spots, float(np.linalg.norm(across)))
+    mean = features().mean
     face = standard_face(grey, middle, across)
-    shown = {name: to_standard(place, middle, across) for name, place in places.items()}
-    refined = _refine(face, shown)
-    steps.append(
-        Step("The most likely head, pupils and brows by brightness", _draw(even(face, LOCAL), refined, {}))
+    places, _ = features().follow(face, mean)
+    steps.append(Step("From the points of a mean face to those of this one", _draw(face, mean, places)))
+    for _ in range(2):
+        at = from_standard(places, middle, across)
+        middle, across = standard_frame(at, mean)
+        face = standard_face(grey, middle, across)
+        places, _ = features().follow(face, to_standard(at, middle, across), 2)
+    places = _with_pupils(face, places)
+    steps.append(Step("The same from there, and pupils by their brightness", _draw(face, None, places)))
+    at = from_standard(places, middle, across) * photograph.scale
+    found = {name: (float(x), float(y)) for name, (x, y) in zip(FRONT_POINTS, at, strict=True)}
+    return FoundPoints(
+        {name: place for name, place in found.items() if name not in HARDLY_SEEN}, score, steps
     )
-    result = {
-        name: from_standard(refined[name], middle, across) * photograph.scale
-        for name in FRONT_POINTS
-        if name in POINTS
-    }
-    return FoundPoints({name: (float(x), float(y)) for name, (x, y) in result.items()}, score, steps)
 
 
 def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8]:
@@ -157,12 +119,10 @@ def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8
     if score < FACE_SCORE:
         raise ModelError(
             f"{name or 'the picture'}: no face was found that looks at the camera (likeness {score:.2f}, "
-            f"at least {FACE_SCORE} is needed); place its points by hand"
+            f"at least {FACE_SCORE:g} is needed); place its points by hand"
         )
     for other, place, _ in scored[1:]:
-        if other > max(SECOND_FACE * score, FACE_SCORE) and np.linalg.norm(
-            place - middle
-        ) > 2.5 * np.linalg.norm(across):
+        if other > SECOND_FACE and np.linalg.norm(place - middle) > 2.5 * np.linalg.norm(across):
             warn(
                 f"{name or 'the picture'}: there may be a second face near ({place[0]:.0f}, {place[1]:.0f}); "
                 "the likelier one is taken. Cut the picture to one face if it is the wrong one",
@@ -207,9 +167,8 @@ def _distinct(
 
 
 def _likeness(grey: Float64, middle: Float64, across: Float64) -> float:
-    """Return how like those of a face the points around two eyes are, 0 to 1."""
-    _, likeness = _search(even(standard_face(grey, middle, across), LOCAL), {}, 1.0, 4.0, SURE, phases=False)
-    return float(np.mean(list(likeness.values())))
+    """Return how like a face's the points are that are found from a place: about 1, or -1 of no face."""
+    return features().follow(standard_face(grey, middle, across), features().mean)[1]
 
 
 def _reduced(grey: Float64, factor: float) -> Float64:
@@ -233,86 +192,13 @@ def _turned_back(place: Float64, shape: tuple[int, ...], degrees: float) -> tupl
     return turn @ (place - centre) + centre, turn[:, 0]
 
 
-def _search(
-    face: Float64,
-    expected: dict[str, Float64],
-    share: float,
-    least: float,
-    names: tuple[str, ...] = POINTS,
-    *,
-    phases: bool = True,
-) -> tuple[dict[str, Float64], dict[str, float]]:
-    """Return the likeliest places (2,) of points in an evened face of standard size, and their likeness."""
-    known = features()
-    responses = gabor(face) if phases else None
-    found, likeness = {}, {}
-    first, second, third, fourth = WEIGHTS
-    for name in names:
-        number, mirrored = known.of(name)
-        usual, spread = known.place(name)
-        centre = expected.get(name, usual + MIDDLE)
-        half = np.maximum(REGION * share * spread, least)
-        mean, vectors, prototype = known.means[number], known.vectors[number], known.phases[number]
-        if mirrored:
-            mean, vectors, prototype = mean[:, ::-1], vectors[:, :, ::-1], mirror_phases(prototype)
-        low = np.maximum(np.floor(centre - half).astype(int), PATCH)
-        high = np.minimum(np.ceil(centre + half).astype(int) + 1, np.array(face.shape[::-1]) - PATCH)
-        if (high - low < 1).any():
-            found[name], likeness[name] = centre, 0.0
-            continue
-        rows, columns = slice(low[1] - PATCH, high[1] + PATCH), slice(low[0] - PATCH, high[0] + PATCH)
-        along, distance = (
-            one[PATCH:-PATCH, PATCH:-PATCH] for one in subspace(face[rows, columns], mean, vectors)
-        )
-        y, x = np.mgrid[low[1] : high[1], low[0] : high[0]]
-        away = ((x - centre[0]) / half[0]) ** 2 + ((y - centre[1]) / half[1]) ** 2
-        score = first * along - second * distance - fourth * away
-        if responses is not None:
-            score -= third * phase_distance(responses[:, low[1] : high[1], low[0] : high[0]], prototype)
-        top = np.unravel_index(int(score.argmax()), score.shape)
-        found[name] = _peak(score, top) + low
-        likeness[name] = float(np.clip(along[top], 0, 1))
-    return found, likeness
-
-
-def _peak(score: Float64, top: tuple[np.intp, ...]) -> Float64:
-    """Return x and y of a maximum between pixels, by a parabola along each axis."""
-    y, x = int(top[0]), int(top[1])
-    result = np.array([float(x), float(y)])
-    for axis, line, at in ((0, score[y, :], x), (1, score[:, x], y)):
-        if 0 < at < len(line) - 1:
-            bend = line[at - 1] - 2 * line[at] + line[at + 1]
-            if bend < -1e-9:
-                result[axis] += float(np.clip((line[at - 1] - line[at + 1]) / (2 * bend), -0.5, 0.5))
-    return result
-
-
-def _likely_head(places: dict[str, Float64], eyes: float) -> tuple[dict[str, Float64], Float64, Float64]:
-    """Return where the most likely head shows its points, given places in a picture, and its eyes.
-
-    eyes: distance between the pupils, pixels. Returns (places, middle of the pupils, right pupil to left).
-    """
-    from fba.face.builtin import default
-
-    base = default().points
-    row = point_rows()
-    names = list(places)
-    seen = Observation([row[name] for name in names], np.array([places[name] for name in names]))
-    view = first_view(base, seen, 1.5)
-    _, views = solve(base, [view], [seen], rigid=True)
-    head, views = solve(base, views, [seen], noise=GUESS_NOISE / EYES * 0.0625, hidden=True)
-    shown = views[0].project(head)
-    result = {name: shown[row[name]] for name in (*POINTS, *FRONT_POINTS)}
-    left, right = result["3.5"], result["3.6"]
-    return result, (left + right) / 2, left - right
-
-
-def _refine(face: Float64, places: dict[str, Float64]) -> dict[str, Float64]:
-    """Return places with the pupils at the darkest column and row (integral projections) near them."""
-    result = dict(places)
+def _with_pupils(face: Float64, places: Float64) -> Float64:
+    """Return places (P, 2) with the pupils at the darkest column and row (integral projections) near them."""
+    result = places.copy()
     smooth = gaussian_filter(face, 1.0)
-    for name, reach in (("3.5", 5), ("3.6", 5)):
-        x, y = np.round(places[name]).astype(int)
+    reach = PUPIL
+    for row in (FRONT_POINTS.index("3.5"), FRONT_POINTS.index("3.6")):
+        x, y = np.round(places[row]).astype(int)
         window = smooth[y - reach : y + reach + 1, x - reach - 1 : x + reach + 2]
         if window.shape != (2 * reach + 1, 2 * reach + 3):
             continue
@@ -323,29 +209,23 @@ def _refine(face: Float64, places: dict[str, Float64]) -> dict[str, Float64]:
             continue
         right = float((dark[0] * np.arange(len(columns))).sum() / dark[0].sum()) - reach - 1
         down = float((dark[1] * np.arange(len(rows))).sum() / dark[1].sum()) - reach
-        result[name] = (
-            places[name] + np.clip([x + right - places[name][0], y + down - places[name][1]], -2, 2) * 0.5
-        )
+        result[row] += np.clip([x + right, y + down] - places[row], -2, 2) * 0.5
     return result
 
 
-def _draw(face: Float64, places: dict[str, Float64], likeness: dict[str, float]) -> UInt8:
-    """Return a picture of a face of standard size, three times as large, with places on it."""
+def _draw(face: Float64, before: Float64 | None, places: Float64) -> UInt8:
+    """Return a picture of a face of standard size, three times as large, with points and their ways there."""
     from PIL import Image, ImageDraw
 
     low, high = np.percentile(face, (1, 99))
-    image = Image.fromarray(_grey_picture(np.clip((face - low) / max(high - low, 1e-9), 0, 1)))
+    image = Image.fromarray(_grey_picture((face - low) / max(high - low, 1e-9)))
     image = image.resize((image.width * 3, image.height * 3))
     pen = ImageDraw.Draw(image)
-    for name, place in places.items():
-        x, y = (place + 0.5) * 3
-        share = likeness.get(name, 1.0)
-        pen.ellipse([x - 3, y - 3, x + 3, y + 3], fill=(int(255 * (1 - share)), int(255 * share), 60))
-        if name in likeness:
-            usual, spread = features().place(name)
-            left, top = (usual + MIDDLE - REGION * spread) * 3
-            right, bottom = (usual + MIDDLE + REGION * spread) * 3
-            pen.rectangle([left, top, right, bottom], outline=(90, 140, 255))
+    for row, (x, y) in enumerate((places + 0.5) * 3):
+        if before is not None:
+            start = (before[row] + 0.5) * 3
+            pen.line([*start, x, y], fill=(90, 140, 255), width=2)
+        pen.ellipse([x - 3, y - 3, x + 3, y + 3], fill=(40, 220, 60))
     return np.asarray(image)
 
 

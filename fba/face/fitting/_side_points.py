@@ -24,10 +24,12 @@ RIPPLE = 0.5
 """Pixels by which an outline goes back, at least, between two of its extrema."""
 SLOPES = (0.0, 0.15, 0.3, 0.45)
 """Slants of the outline, tried one after another, at which its extrema are looked for."""
-LIP_SHARE = (0.32, 0.72)
-"""Range of the height of the mouth between the tip of the nose (0) and the boss of the chin (1)."""
-FLATNESS = 0.9
-"""Largest depth of nose, lips and chin as a share of the height from nose to chin."""
+RANGES = {
+    "9.15": ((0.12, 0.42), (0.06, 0.38)), "8.1": ((0.22, 0.60), (-0.05, 0.38)),
+    "2.2": ((0.33, 0.72), (0.05, 0.45)), "8.2": ((0.40, 0.85), (0.0, 0.42)),
+    "2.10": ((1.0, 1.0), (0.10, 0.52)),
+}  # fmt: skip
+"""How far points are below and behind the tip of the nose, as shares of the height from there to the chin."""
 LEAST_HEIGHT = 0.1
 """Least height from nose to chin as a share of the picture's."""
 NOSE_WIDTH = 0.06
@@ -189,13 +191,15 @@ def _is_face(found: dict[str, float], signal: Float64) -> bool:
     """Whether the extrema lie as those of a face: all there, and at its usual proportions."""
     if "2.10" not in found:
         return False
-    tall = found["2.10"] - found["9.3"]
-    across = [signal[round(y)] for y in found.values()]
-    return bool(
-        LIP_SHARE[0] < (found["2.2"] - found["9.3"]) / tall < LIP_SHARE[1]
-        and max(across) - min(across) < FLATNESS * tall
-        and tall > LEAST_HEIGHT * len(signal)
-    )
+    nose = found["9.3"]
+    tall = found["2.10"] - nose
+    if tall < LEAST_HEIGHT * len(signal):
+        return False
+    for name, limits in RANGES.items():
+        down, behind = found[name] - nose, signal[round(nose)] - signal[round(found[name])]
+        if not all(low <= at / tall <= high for at, (low, high) in zip((down, behind), limits, strict=True)):
+            return False
+    return True
 
 
 def _draw(mask: Bool, found: dict[str, float], signal: Float64, facing: int) -> UInt8:
