@@ -63,6 +63,7 @@ PICTURES = {
     "virtual-markers.jpg": "make_marker_picture.main",
     "visemes.jpg": "make_head_pictures.visemes",
     "window.jpg": "make_player_pictures.window",
+    "wipe.jpg": "make_player_pictures.wipe",
 }
 """What makes each picture: a function of a module beside this one, which returns it or writes it itself."""
 

@@ -20,6 +20,7 @@ from fba.face.importers.head_surface import read_head_surface
 from fba.formats import merge, read_face
 from fba.tracks import FaceTrack
 from fba_player._ui.panels.puppet_panel import PuppetPanel
+from fba_player.export._offscreen import Offscreen
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.scene.compare import CompareScene
@@ -82,6 +83,19 @@ def compare() -> UInt8:
     session.transport.seek(MOMENT)
     with Studio(session) as studio:
         return studio.draw(2 * SETTLES)
+
+
+def wipe() -> UInt8:
+    """Two faces on either side of a line, and how far each place of the second is from the first."""
+    original = fba.read(SAMPLES / "hello.fap")
+    coarse = fba.decode(fba.encode(original, fba.EncoderOptions(fap_quant=COARSE)))
+    names, size = ["hello.fap", "coarse.fba"], (SIZE[0] // 2, 3 * SIZE[0] // 8)
+    shown = []
+    for arrangement in ("wipe", "colour"):
+        scene = CompareScene([Scene(original), Scene(coarse)], arrangement=arrangement, names=names)
+        with Offscreen(scene, size) as offscreen:
+            shown.append(offscreen.draw(MOMENT))
+    return np.concatenate(shown, axis=1)
 
 
 def lanes() -> UInt8:

@@ -292,6 +292,8 @@ def test_several_files_stand_in_one_picture(run: Run, clip: Path, tmp_path: Path
         ("one", (clip,)),
         ("side", (clip, clip)),
         ("over", (clip, clip, "--arrange", "over")),
+        ("colour", (clip, clip, "--arrange", "colour", "--root", "common")),
+        ("wipe", (clip, clip, "--arrange", "wipe")),
     ):
         output = tmp_path / f"{name}.png"
         size = ("--size", "160x80", "--camera", "front", "--transparent")
@@ -301,7 +303,7 @@ def test_several_files_stand_in_one_picture(run: Run, clip: Path, tmp_path: Path
     heads = {
         name: int((np.diff((shown[30, :, 3] > 127).astype(int)) > 0).sum()) for name, shown in found.items()
     }
-    assert heads == {"one": 1, "side": 2, "over": 1}
+    assert heads == {"one": 1, "side": 2, "over": 1, "colour": 2, "wipe": 1}
     assert (found["one"] != found["over"]).any()
 
 
@@ -309,6 +311,8 @@ def test_several_files_stand_in_one_picture(run: Run, clip: Path, tmp_path: Path
     ("arguments", "text"),
     [
         (("-o", "a.png", "--arrange", "over"), "--arrange needs two files or more"),
+        (("-o", "a.png", "--root", "common"), "--root needs two files or more"),
+        (("-o", "a.png", "clip.fba", "clip.fba", "--arrange", "wipe"), "wipe needs two files; 3 are given"),
         (("-o", "a.png", *["clip.fba"] * 8), "9 files are too many"),
         (("-o", "a.mp4", "--audio", "clip.fba", "--no-audio"), "contradict"),
         (("-o", "a.gif", "--audio", "clip.fba"), "--audio goes into an .mp4"),

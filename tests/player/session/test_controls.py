@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
+from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import SWITCHES, Scene
 from fba_player.session._camera_controller import GLIDE_SECONDS
 from fba_player.session._controls import Controls
@@ -19,6 +20,22 @@ from fba_player.view._camera import Camera, Subject
 @pytest.fixture
 def controls(talking: Animation) -> Controls:
     return Controls(Session(Scene(talking), size=(1000, 600)), plain=True)
+
+
+def test_the_line_of_a_wipe_is_dragged(talking: Animation) -> None:
+    scene = CompareScene([Scene(talking), Scene(talking)], arrangement="wipe")
+    session = Session(scene, size=(1000, 600))
+    controls = Controls(session, plain=True)
+    before = session.viewpoint.camera
+    for start, end, found in ((505, 700, 0.7), (690, 1400, 1.0), (999, -5, 0.0)):
+        controls.press("left", start, 200)
+        controls.move(end, 220)
+        controls.release()
+        assert (scene.wipe, session.viewpoint.camera) == (pytest.approx(found), before)
+    controls.press("left", 500, 200)  # elsewhere, it turns the camera
+    controls.move(600, 200)
+    assert (scene.wipe, session.viewpoint.camera.yaw) != (0.0, before.yaw)
+    assert scene.wipe == 0.0
 
 
 def test_keys_drive_the_transport(controls: Controls) -> None:
