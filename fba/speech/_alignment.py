@@ -24,9 +24,10 @@ PADDING = 0.2
 VOWELS = frozenset(["AA", "AE", "AH", "AO", "AW", "AY", "EH", "ER", "EY", "IH", "IY", "OW", "OY", "UH", "UW"])
 MOST_WORDS = 7.0
 """Words in a second, at most."""
-HEARD = 0.45
-"""Share of frames whose viseme must be recognised without the text, too, for a word to count as heard."""
-FITS = 0.3
+HEARD, FOREIGN_HEARD = 0.45, 0.25
+"""Share of frames whose viseme must be recognised without the text, too, for a word to count as heard: in
+English, and in other languages, whose sounds the recogniser does not know."""
+FITS, FOREIGN_FITS = 0.3, 0.15
 """Share of words that must be heard for a text to be the one that is spoken, unless there is noise."""
 GAP = 0.6
 """Least length of a gap in a text, seconds, in which more may be spoken than it says."""
@@ -34,6 +35,8 @@ SILENT = -60.0
 """dB below full scale under which nothing is spoken."""
 CLEAR = 20.0
 """dB between the loud and the quiet parts of a sound, below which noise hides sounds from a recogniser."""
+BEAM, WIDE_BEAM = (1e-80, 1e-60), (1e-300, 1e-300)
+"""How unlikely a path, and a word, may be against the best: of English sounds, and of others."""
 MISSED_NAMED = 5
 
 
@@ -53,6 +56,7 @@ def find_speech(
     than three words in ten are heard, although there is no noise.
     """
     listener = _Listener(words or (), language)
+    least, fits = (HEARD, FITS) if listener.english else (FOREIGN_HEARD, FOREIGN_FITS)
     phones: list[Phone] = []
     heard: list[Word] = []
     missed: list[Word] = []
@@ -75,7 +79,7 @@ def find_speech(
             phones += _later(filled if aligned else free, start)
             extra += [(max(begin, 0.0) + start, min(stop + start, end)) for begin, stop in gaps]
             for word, share in _compare(spoken, aligned, free):
-                (heard if share >= HEARD else missed).append(
+                (heard if share >= least else missed).append(
                     Word(word.text, word.start + start, word.end + start)
                 )
         progress(end)
@@ -87,7 +91,7 @@ def find_speech(
     share = len(heard) / len(words)
     spoken_words = tuple(sorted([*heard, *missed], key=lambda word: word.start))
     quiet, loud = np.percentile(np.concatenate(levels), (10, 95)) if any(map(len, levels)) else (0.0, 0.0)
-    if not aligned_once or (share < FITS and loud - quiet > CLEAR):
+    if not aligned_once or (share < fits and loud - quiet > CLEAR):
         raise FormatError(_unfit(share, len(words), missed))
     return Speech(
         tuple(_within(phones, end)), spoken_words, end, share, tuple(missed[:MISSED_NAMED]), tuple(extra)
@@ -130,21 +134,23 @@ class _Listener:
 
     def __init__(self, words: Sequence[Pronounced], language: str) -> None:
         self.left = list(words)
-        self._english = language.startswith("en")
+        self.english = language.startswith("en")
         self._free = recogniser_of_phones()
-        self._forced: Any = _decoder(lm=None, bestpath=False) if words else None
+        beam = BEAM if self.english else WIDE_BEAM
+        self._forced: Any = _decoder(beam, lm=None, bestpath=False) if words else None
         self._names: dict[str, list[str]] = {}  # of the phones in IPA, by words that the model lacks
         self._stresses: dict[str, tuple[float, ...]] = {}  # of vowels, by words
         for word in dict.fromkeys(words):
             self._learn(word)
 
     def _learn(self, word: Pronounced) -> None:
-        marks = [next((STRESS_MARKS[m] for m in phone if m in STRESS_MARKS), 0.0) for phone in word.phones]
         pairs = word.arpabet
         self._stresses[word.text] = tuple(
-            mark for mark, phone in zip(marks, word.phones, strict=True) if _is_vowel(phone)
+            max((STRESS_MARKS.get(mark, 0.0) for mark in phone), default=0.0)
+            for name, phone in pairs
+            if name in VOWELS
         )
-        known = self._english and self._forced.lookup_word(word.text) is not None
+        known = self.english and self._forced.lookup_word(word.text) is not None
         if known or word.text in self._names:
             return
         if not pairs:
@@ -153,7 +159,7 @@ class _Listener:
                 'pip install "mpeg4-fba[speech]"'
             )
         self._names[word.text] = [phone for _, phone in pairs]
-        self._forced.add_word(_spelled(word.text, self._english), " ".join(name for name, _ in pairs), True)
+        self._forced.add_word(_spelled(word.text, self.english), " ".join(name for name, _ in pairs), True)
 
     def recognise(self, sound: Int16) -> list[Phone]:
         """Return the phones of a sound without a text."""
@@ -187,7 +193,7 @@ class _Listener:
         """Return how many of the words are spoken, from the first on, by a grammar of all beginnings."""
         if not words:
             return 0
-        names = [_spelled(word.text, self._english) for word in words]
+        names = [_spelled(word.text, self.english) for word in words]
         end = len(names) + 1
         steps: list[tuple[Any, ...]] = [(at, at + 1, 0.9, name) for at, name in enumerate(names)]
         steps += [(at, end, 0.1) for at in range(len(names) + 1)]
@@ -201,7 +207,7 @@ class _Listener:
         return 0 if found is None else len(found.hypstr.split())
 
     def _force(self, sound: Int16, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Word]]:
-        self._forced.set_align_text(" ".join(_spelled(word.text, self._english) for word in spoken))
+        self._forced.set_align_text(" ".join(_spelled(word.text, self.english) for word in spoken))
         try:
             _run(self._forced, sound)
             self._forced.set_alignment()
@@ -243,10 +249,6 @@ def _spelled(text: str, english: bool) -> str:
     return text if english else f"~{text}"
 
 
-def _is_vowel(phone: str) -> bool:
-    return max(find_sound(phone).visemes) > 9
-
-
 def _spread(stresses: Sequence[float], names: Sequence[str], text: str) -> list[float]:
     """Return the stress of each phone. Without stresses for all vowels, the first of a long word has it."""
     vowels = [at for at, name in enumerate(names) if name in VOWELS]
@@ -271,13 +273,13 @@ def _model_path(name: str) -> str:
 
 def recogniser_of_phones() -> Any:
     """Return pocketsphinx' recogniser of phones without a text. Raises UnsupportedError without it."""
-    return _decoder(allphone=_model_path("en-us/en-us-phone.lm.bin"), lw=2.0, pip=0.3)
+    return _decoder(BEAM, allphone=_model_path("en-us/en-us-phone.lm.bin"), lw=2.0, pip=0.3)
 
 
-def _decoder(**options: Any) -> Any:
+def _decoder(beam: tuple[float, float], **options: Any) -> Any:
     from pocketsphinx import Decoder
 
-    return Decoder(beam=1e-80, wbeam=1e-60, pbeam=1e-80, loglevel="FATAL", **options)
+    return Decoder(beam=beam[0], wbeam=beam[1], pbeam=beam[0], loglevel="FATAL", **options)
 
 
 def _run(decoder: Any, sound: Int16) -> None:
