@@ -24,9 +24,10 @@ PADDING = 0.2
 VOWELS = frozenset(["AA", "AE", "AH", "AO", "AW", "AY", "EH", "ER", "EY", "IH", "IY", "OW", "OY", "UH", "UW"])
 MOST_WORDS = 7.0
 """Words in a second, at most."""
-HEARD = 0.45
-"""Share of frames whose viseme must be recognised without the text, too, for a word to count as heard."""
-FITS = 0.3
+HEARD, FOREIGN_HEARD = 0.45, 0.25
+"""Share of frames whose viseme must be recognised without the text, too, for a word to count as heard: in
+English, and in other languages, whose sounds the recogniser does not know."""
+FITS, FOREIGN_FITS = 0.3, 0.15
 """Share of words that must be heard for a text to be the one that is spoken, unless there is noise."""
 GAP = 0.6
 """Least length of a gap in a text, seconds, in which more may be spoken than it says."""
@@ -34,10 +35,11 @@ SILENT = -60.0
 """dB below full scale under which nothing is spoken."""
 CLEAR = 20.0
 """dB between the loud and the quiet parts of a sound, below which noise hides sounds from a recogniser."""
+BEAM, PATIENT_BEAM, WIDE_BEAM = (1e-80, 1e-60), (1e-200, 1e-150), (1e-300, 1e-300)
+"""How unlikely a path, and a word, may be against the best: of English sounds, of a second try, of others."""
+DICTATION_BEAM = (1e-48, 7e-29)
+"""The same where any English words may be spoken: pocketsphinx' own."""
 MISSED_NAMED = 5
-WIDE = {"beam": 1e-80, "wbeam": 1e-60, "pbeam": 1e-80}
-WIDEST = {"beam": 1e-200, "wbeam": 1e-150, "pbeam": 1e-200}
-"""Beams of the recogniser that seldom lose a word of a given text, and those of a second try."""
 
 
 def find_speech(
@@ -56,6 +58,7 @@ def find_speech(
     than three words in ten are heard, although there is no noise.
     """
     listener = _Listener(words, language)
+    least, fits = (HEARD, FITS) if listener.english else (FOREIGN_HEARD, FOREIGN_FITS)
     phones: list[Phone] = []
     heard: list[Word] = []
     missed: list[Word] = []
@@ -78,7 +81,7 @@ def find_speech(
             phones += _later(filled if aligned else free, start)
             extra += [(max(begin, 0.0) + start, min(stop + start, end)) for begin, stop in gaps]
             for word, share in _compare(spoken, aligned, free):
-                (heard if share >= HEARD else missed).append(
+                (heard if share >= least else missed).append(
                     Word(word.text, word.start + start, word.end + start)
                 )
         progress(end)
@@ -90,7 +93,7 @@ def find_speech(
     share = len(heard) / len(words)
     spoken_words = tuple(sorted([*heard, *missed], key=lambda word: word.start))
     quiet, loud = np.percentile(np.concatenate(levels), (10, 95)) if any(map(len, levels)) else (0.0, 0.0)
-    if not aligned_once or (share < FITS and loud - quiet > CLEAR):
+    if not aligned_once or (share < fits and loud - quiet > CLEAR):
         raise FormatError(_unfit(share, len(words), missed))
     return Speech(
         tuple(_within(phones, end)), spoken_words, end, share, tuple(missed[:MISSED_NAMED]), tuple(extra)
@@ -133,26 +136,27 @@ class _Listener:
 
     def __init__(self, words: Sequence[Pronounced] | None, language: str) -> None:
         self.left = list(words or ())
-        self._english = language.startswith("en")
+        self.english = language.startswith("en")
         self._free = recogniser_of_phones()
-        self._forced: Any = _decoder(**WIDE, lm=None, bestpath=False)
+        self._forced: Any = _decoder(BEAM if self.english else WIDE_BEAM, lm=None, bestpath=False)
         self._patient: Any = None
         self._added: dict[str, str] = {}  # phones in ARPAbet of words that the model lacks, as it spells them
         self._dictation: Any = None
-        if words is None and self._english:
-            self._dictation = _decoder(fwdflat=False, bestpath=False)
+        if words is None and self.english:
+            self._dictation = _decoder(DICTATION_BEAM, fwdflat=False, bestpath=False)
         self._names: dict[str, list[str]] = {}  # of the phones in IPA, by words that the model lacks
         self._stresses: dict[str, tuple[float, ...]] = {}  # of vowels, by words
         for word in dict.fromkeys(self.left):
             self._learn(word)
 
     def _learn(self, word: Pronounced) -> None:
-        marks = [next((STRESS_MARKS[m] for m in phone if m in STRESS_MARKS), 0.0) for phone in word.phones]
         pairs = word.arpabet
         self._stresses[word.text] = tuple(
-            mark for mark, phone in zip(marks, word.phones, strict=True) if _is_vowel(phone)
+            max((STRESS_MARKS.get(mark, 0.0) for mark in phone), default=0.0)
+            for name, phone in pairs
+            if name in VOWELS
         )
-        known = self._english and self._forced.lookup_word(word.text) is not None
+        known = self.english and self._forced.lookup_word(word.text) is not None
         if known or word.text in self._names:
             return
         if not pairs:
@@ -161,7 +165,7 @@ class _Listener:
                 'pip install "mpeg4-fba[speech]"'
             )
         self._names[word.text] = [phone for _, phone in pairs]
-        spelled = _spelled(word.text, self._english)
+        spelled = _spelled(word.text, self.english)
         self._added[spelled] = " ".join(name for name, _ in pairs)
         self._forced.add_word(spelled, self._added[spelled], True)
 
@@ -206,7 +210,7 @@ class _Listener:
         """Return how many of the words are spoken, from the first on, by a grammar of all beginnings."""
         if not words:
             return 0
-        names = [_spelled(word.text, self._english) for word in words]
+        names = [_spelled(word.text, self.english) for word in words]
         end = len(names) + 1
         steps: list[tuple[Any, ...]] = [(at, at + 1, 0.9, name) for at, name in enumerate(names)]
         steps += [(at, end, 0.1) for at in range(len(names) + 1)]
@@ -224,7 +228,7 @@ class _Listener:
         phones, words = self._align_by(self._forced, sound, spoken)
         if len(words) < len(spoken):  # it lost its way: again, more patiently
             if self._patient is None:
-                self._patient = _decoder(**WIDEST, lm=None, bestpath=False)
+                self._patient = _decoder(PATIENT_BEAM, lm=None, bestpath=False)
                 for spelled, names in self._added.items():
                     self._patient.add_word(spelled, names, True)
             phones, words = self._align_by(self._patient, sound, spoken)
@@ -235,7 +239,7 @@ class _Listener:
     def _align_by(
         self, decoder: Any, sound: Int16, spoken: Sequence[Pronounced]
     ) -> tuple[list[Phone], list[Word]]:
-        decoder.set_align_text(" ".join(_spelled(word.text, self._english) for word in spoken))
+        decoder.set_align_text(" ".join(_spelled(word.text, self.english) for word in spoken))
         try:
             _run(decoder, sound)
             decoder.set_alignment()
@@ -284,10 +288,6 @@ def _spelled(text: str, english: bool) -> str:
     return text if english else f"~{text}"
 
 
-def _is_vowel(phone: str) -> bool:
-    return max(find_sound(phone).visemes) > 9
-
-
 def _spread(stresses: Sequence[float], names: Sequence[str], text: str) -> list[float]:
     """Return the stress of each phone. Without stresses for all vowels, the first of a long word has it."""
     vowels = [at for at, name in enumerate(names) if name in VOWELS]
@@ -312,13 +312,13 @@ def _model_path(name: str) -> str:
 
 def recogniser_of_phones() -> Any:
     """Return pocketsphinx' recogniser of phones without a text. Raises UnsupportedError without it."""
-    return _decoder(**WIDE, allphone=_model_path("en-us/en-us-phone.lm.bin"), lw=2.0, pip=0.3)
+    return _decoder(BEAM, allphone=_model_path("en-us/en-us-phone.lm.bin"), lw=2.0, pip=0.3)
 
 
-def _decoder(**options: Any) -> Any:
+def _decoder(beam: tuple[float, float], **options: Any) -> Any:
     from pocketsphinx import Decoder
 
-    return Decoder(loglevel="FATAL", **options)
+    return Decoder(beam=beam[0], wbeam=beam[1], pbeam=beam[0], loglevel="FATAL", **options)
 
 
 def _run(decoder: Any, sound: Int16) -> None:

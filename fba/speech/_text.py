@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from fba.errors import FormatError, UnsupportedError
-from fba.speech._sounds import strip_marks
+from fba.speech._sounds import STRESS_MARKS, strip_marks
 from fba.text_files import packaged_rows
 
 MOST_LETTERS = 1_000_000
@@ -29,7 +29,7 @@ class Pronounced:
     def arpabet(self) -> list[tuple[str, str]]:
         """Phones in ARPAbet, each with the one in IPA that it stands for. Raises FormatError for others."""
         table = _arpabet()
-        return [(name, phone) for phone in self.phones for name in _lookup(phone, table)]
+        return [pair for phone in self.phones for pair in _lookup(phone, table)]
 
 
 @cache
@@ -38,14 +38,16 @@ def _arpabet() -> dict[str, tuple[str, ...]]:
     return {ipa: tuple(row["arpabet"].split()) for row in rows for ipa in row["ipa"].split()}
 
 
-def _lookup(phone: str, table: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+def _lookup(phone: str, table: dict[str, tuple[str, ...]]) -> list[tuple[str, str]]:
+    """Return a phone in ARPAbet, and in IPA; one that the table lacks, such as Spanish we, by its letters."""
     plain = strip_marks(phone)
     if plain in table:
-        return table[plain]
-    parts = [table[letter] for letter in plain if letter in table]
+        return [(name, phone) for name in table[plain]]
+    stress = "".join(mark for mark in phone if mark in STRESS_MARKS)
+    parts = [(name, stress + letter) for letter in plain if letter in table for name in table[letter]]
     if not parts:
         raise FormatError(f"the sound {phone!r} has no likeness in English, whose recogniser aligns the text")
-    return tuple(name for part in parts for name in part)
+    return parts
 
 
 def split_text(text: str, language: str = ENGLISH) -> list[Pronounced]:

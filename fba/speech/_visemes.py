@@ -30,29 +30,26 @@ BLENDS = (0, 21, 42, 63)
 def find_keys(shapes: Sequence[Shape], rate: Fraction) -> list[tuple[int, Shape]]:
     """Return frames at which the mouth shows a viseme, in their order; between them it moves linearly.
 
-    Frame n is at n / rate seconds. Closures are always among them; of others that are too near to each other,
-    the one that weighs more.
+    Frame n is at n / rate seconds. Closures are always among them, and a sound between two of them, for which
+    the mouth opens; of others that are too near to each other, the one that weighs more.
     """
-    wanted: list[tuple[float, Shape]] = []
-    for shape in shapes:
-        length = shape.end - shape.start
-        if length >= LONG and shape.viseme not in CLOSED:
-            wanted += [(shape.start + INSET, shape), (shape.end - INSET, shape)]
-        elif shape.viseme in CLOSED or length > SHORT or shape.weight > WEAK:
-            wanted.append((shape.centre, shape))
-    keys: list[tuple[int, Shape]] = []
-    for moment, shape in wanted:
+    closed = [False, *(shape.viseme in CLOSED for shape in shapes), False]
+    wanted: list[tuple[float, Shape, tuple[bool, float]]] = []
+    for shape, before, itself, after in zip(shapes, closed, closed[1:], closed[2:], strict=False):
+        length, rank = shape.end - shape.start, (itself or (before and after), shape.weight)
+        if length >= LONG and not itself:
+            wanted += [(shape.start + INSET, shape, rank), (shape.end - INSET, shape, rank)]
+        elif rank[0] or length > SHORT or shape.weight > WEAK:
+            wanted.append((shape.centre, shape, rank))
+    keys: list[tuple[int, Shape, tuple[bool, float]]] = []
+    for moment, shape, rank in wanted:
         frame = round(moment * rate)
-        while keys and frame - keys[-1][0] < APART * rate and _rank(keys[-1][1]) < _rank(shape):
+        while keys and frame - keys[-1][0] < APART * rate and keys[-1][2] < rank and not keys[-1][2][0]:
             keys.pop()
         free = frame - keys[-1][0] if keys else APART * rate
-        if free >= APART * rate or (shape.viseme in CLOSED and free > 0):
-            keys.append((frame, shape))
-    return keys
-
-
-def _rank(shape: Shape) -> tuple[bool, float]:
-    return shape.viseme in CLOSED, shape.weight
+        if free >= APART * rate or (rank[0] and free > 0):
+            keys.append((frame, shape, rank))
+    return [(frame, shape) for frame, shape, _ in keys]
 
 
 def nearest_blend(share: float) -> int:

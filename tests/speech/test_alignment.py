@@ -17,8 +17,9 @@ from bench.spoken import FLITE, KNOWN, speak
 from fba.arrays import Int16
 from fba.audio import read_mono
 from fba.errors import FormatError, UnsupportedError
-from fba.speech import RATE, Phone, Prosody, find_shapes, find_speech, split_text
+from fba.speech import RATE, Phone, Prosody, find_shapes, find_speech, speak_text, split_text
 from fba.speech._pieces import cut_at_pauses, measure_loudness
+from fba.speech._text import Pronounced
 
 needs_recogniser = pytest.mark.skipif(
     importlib.util.find_spec("pocketsphinx") is None,
@@ -93,6 +94,24 @@ def test_a_text_that_is_longer_or_shorter_than_the_sound_says_where(tmp_path: Pa
     after = [shape.viseme for shape in find_shapes(shorter.phones) if shape.start > start]
     assert 7 in after, "the mouth follows the sound"
     assert not find_speech([sound], words).extra
+
+
+@needs_recogniser
+@pytest.mark.skipif(shutil.which("espeak-ng") is None, reason="eSpeak NG is not installed")
+def test_sounds_of_other_languages_are_aligned_by_their_likeness(tmp_path: Path) -> None:
+    said = {
+        "buenos": "b ˈwe n o s", "días": "d ˈi a s", "el": "e l", "niño": "n ˈi ɲ o", "come": "k ˈo m e",
+        "tres": "t ɾ e s", "manzanas": "m a n θ ˈa n a s",
+    }  # fmt: skip
+    speak_text(" ".join(said), tmp_path / "speech.wav", program="espeak-ng", language="es")
+    words = [Pronounced(text, tuple(phones.split())) for text, phones in said.items()]
+    found = find_speech(read_mono(tmp_path / "speech.wav", RATE), words, language="es-es")
+    assert found.found is not None
+    assert found.found > 0.5
+    starts = [word.start for word in found.words]
+    assert [word.text for word in found.words] == list(said)
+    assert np.diff(starts).min() > 0.08
+    assert {"ɲ", "θ"} <= {phone.name for phone in found.phones}
 
 
 @needs_recogniser

@@ -95,6 +95,17 @@ def test_lips_open_between_closures(coding: Coding) -> None:
             assert shown(decoded, around)[:, INNER_LIPS[4]].max() > 100
 
 
+@pytest.mark.parametrize("coding", CODINGS)
+@pytest.mark.parametrize("start", [0.2, 0.21, 0.232, 0.235])
+def test_a_short_vowel_between_two_closures_opens_the_mouth(coding: Coding, start: float) -> None:
+    """As in "maps", quickly said."""
+    ends = start + np.cumsum([0.06, 0.08, 0.10])
+    phones = [Phone("M", start, ends[0]), Phone("AE", ends[0], ends[1]), Phone("P", ends[1], ends[2])]
+    made = perform(Speech((Phone("SIL", 0, start), *phones), (), 0.8), coding=coding, life=0)
+    jaw = shown(made, np.linspace(ends[0], ends[1], 9).tolist())[:, INNER_LIPS[4]]
+    assert jaw.max() > 60
+
+
 def test_rounded_vowels_push_the_lips_and_spread_ones_do_not() -> None:
     phones = (Phone("SIL", 0, 0.2), Phone("IY", 0.2, 0.4), Phone("T", 0.4, 0.5), Phone("UW", 0.5, 0.7))
     for coding in CODINGS:
