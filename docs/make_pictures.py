@@ -58,6 +58,7 @@ PICTURES = {
     "real-recordings-faces-bars.svg": "make_bitrate_page.pictures",
     "real-recordings-faces.svg": "make_bitrate_page.pictures",
     "simplify.jpg": "make_simplify_picture.levels",
+    "speech.png": "make_speech_picture.main",
     "switches.jpg": "make_head_pictures.switches",
     "twists.jpg": "make_body_pictures.twists",
     "virtual-markers.jpg": "make_marker_picture.main",

@@ -52,8 +52,8 @@ class _Said:
     timings: Path | None = option(
         type=options.FILE,
         metavar="FILE",
-        help="Phones or visemes with their times, by another program: TextGrid, CTM, SRT with phones, "
-        "Rhubarb's JSON or TSV, the visemes of Azure and of Oculus as JSON.",
+        help="Phones or visemes with their times, by another program: TextGrid, CTM, SRT with phones, files "
+        "of Montreal Forced Aligner, Rhubarb, Papagayo, Moho; visemes of Azure, Oculus, Polly as JSON.",
     )
     language: str = option(
         default="en-us",
