@@ -46,7 +46,7 @@ POSES: tuple[dict[int, int], ...] = (
 broad grin, the lips apart with wide eyes, and the lips pushed forward with raised cheeks."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-IMPORTANCE = 60.0
+IMPORTANCE = 100.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
 LID_SHARE = 4.0
@@ -121,7 +121,7 @@ class FaceSimplification:
         face = replace(model, parts=parts, bound=bound.astype(np.int32), tables=(), levels=())
         if tables:
             fitted = fit_tables(model, face, level, self._unmoved(level), self.mesh.positions)
-            face = (lambda f: f)(replace(face, tables=fitted))
+            face = _mend(replace(face, tables=fitted))
         return DetailLevel(
             face, level.parents, max(self._errors(level, _root_mean_square)), shape_key(model.parts)
         )

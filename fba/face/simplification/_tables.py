@@ -38,7 +38,7 @@ LIFTS = 30
 """Rounds in which lids are lifted off the eyeball: lifting one triangle tilts its neighbours."""
 ROUNDS = 4
 """Rounds in which lids are lifted off the eyeball and folds taken out of them."""
-MOST_LIFT = 0.25
+MOST_LIFT = 0.5
 """Largest lift, as a share of the eyeball's radius."""
 SAMPLES = np.array([(0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3), *np.eye(3)])
 """Places on a triangle that are kept out of the eyeball, as weights of its corners."""
@@ -266,9 +266,7 @@ def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -
     triangles = surface.triangles
     triangles = triangles[moved[triangles].any(axis=1) & outside[triangles].all(axis=1)]
     free = ~pinned[triangles]
-    # how far a sample goes with the corners that can
-    share = np.einsum("sk,fk->fs", SAMPLES, free)
-    of_corner = (SAMPLES > 0) & free[:, None]
+    moves = np.einsum("sk,fk->fs", SAMPLES, free) > 0  # samples that a corner can lift
     was = np.maximum(_depth(profile, before[triangles]), 0.0)
     shifts = np.zeros((len(motion.values), *before.shape))
     shifts[:, motion.vertices] = motion.shifts
@@ -279,11 +277,11 @@ def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -
             now[:, :, 2] += lifted[triangles]
             deep = _depth(profile, now) - was
             deep[np.einsum("sk,fk->fs", SAMPLES, now[:, :, 2]) < profile.centre[2]] = 0.0
-            push = np.where(share > 0, np.maximum(deep, 0.0) / np.maximum(share, 1e-9), 0.0)
+            push = np.where(moves, deep, 0.0).max(axis=1, initial=0.0)
             if not push.any():
                 break
             more = np.zeros(len(before))
-            np.maximum.at(more, triangles, np.where(of_corner, push[:, :, None], 0.0).max(axis=1))
+            np.maximum.at(more, triangles[free], np.repeat(push[:, None], 3, axis=1)[free])
             lifted = np.minimum(lifted + more, MOST_LIFT * profile.size)
         shifts[k, :, 2] += lifted
     vertices = np.flatnonzero(shifts.any(axis=(0, 2)))
