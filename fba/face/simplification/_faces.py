@@ -16,14 +16,13 @@ import numpy as np
 from fba.arrays import Bool, Float32, Float64, Int32
 from fba.errors import ModelError
 from fba.face.authoring import author
-from fba.face.authoring.surface.landmarks import find_landmarks, weld_skin
 from fba.face.checks._fap_checks import count_errors
 from fba.face.checks._posing import Poser
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
 from fba.face.importers.assembly._repair import repair_tables
 from fba.face.model import DetailLevel, FaceModel, shape_key
-from fba.face.simplification._tables import fit_tables
+from fba.face.simplification._tables import find_lines, fit_tables
 from fba.mesh.simplify import (
     Level,
     Simplification,
@@ -47,12 +46,9 @@ POSES: tuple[dict[int, int], ...] = (
 broad grin, the lips apart with wide eyes, and the lips pushed forward with raised cheeks."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-IMPORTANCE = 60.0
+IMPORTANCE = 100.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
-LINES = ("left upper lid", "left lower lid", "right upper lid", "right lower lid", "upper inner lip",
-         "lower inner lip")  # fmt: skip
-"""Contours that stay lines of the mesh: what meets there must meet on coarse faces too."""
 LID_SHARE = 4.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5
@@ -125,7 +121,7 @@ class FaceSimplification:
         face = replace(model, parts=parts, bound=bound.astype(np.int32), tables=(), levels=())
         if tables:
             fitted = fit_tables(model, face, level, self._unmoved(level), self.mesh.positions)
-            face = (lambda f: f)(replace(face, tables=fitted))
+            face = _mend(replace(face, tables=fitted))
         return DetailLevel(
             face, level.parents, max(self._errors(level, _root_mean_square)), shape_key(model.parts)
         )
@@ -159,7 +155,7 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         )
     deformer = Deformer(model)
     poses = np.stack([deformer.local(_values(pose)) for pose in POSES]).astype(np.float64)
-    kept, lines = _find_pinned(model), _find_lines(model)
+    kept, lines = _find_pinned(model), find_lines(model)
     mesh = simplify(
         poses,
         model.triangles,
@@ -215,15 +211,6 @@ def _find_pinned(model: FaceModel) -> Bool:
                 around = np.argsort(np.arctan2(off[:, 1], off[:, 0]))
                 pinned[rim[around[:: -(-len(rim) // RIM_VERTICES)]]] = True
     return pinned
-
-
-def _find_lines(model: FaceModel) -> Int32:
-    """Return (V,): a bit for each of `LINES` that a vertex is on."""
-    marks = find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
-    lines = np.zeros(len(model.vertices), dtype=np.int32)
-    for bit, name in enumerate(LINES):
-        lines[marks.surface.pool[np.isin(marks.surface.number, marks.contour(name))]] |= 1 << bit
-    return lines
 
 
 def _importance(model: FaceModel) -> Float64:

@@ -19,12 +19,15 @@ from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion, build_tables, fap_limits, split_by_part, unfold
 from fba.face.authoring.surface._motion_limits import stop_at_folds
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
-from fba.face.authoring.surface.surface import Surface
+from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
 from fba.face.checks._fap_checks import CORNER_RADIUS, EYE_CORNERS, HAIR, TURNING, region_table
 from fba.face.model import FaceModel, Part
 from fba.mesh.simplify import Level, part_starts, place_on_level
 from fba.parameters import faps, point_rows
 
+LINES = ("left upper lid", "left lower lid", "right upper lid", "right lower lid", "upper inner lip",
+         "lower inner lip")  # fmt: skip
+"""Contours that stay lines of the mesh: what meets there must meet on coarse faces too."""
 SMOOTHING = 0.3
 """Weight of the interpolated motion of a vertex compared to that of each vertex that it stands for."""
 LEAST_MOTION = 1e-3
@@ -35,8 +38,23 @@ LIFTS = 30
 """Rounds in which lids are lifted off the eyeball: lifting one triangle tilts its neighbours."""
 ROUNDS = 4
 """Rounds in which lids are lifted off the eyeball and folds taken out of them."""
-SAMPLES = np.array([(0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3), (1, 0, 0)])
+MOST_LIFT = 0.5
+"""Largest lift, as a share of the eyeball's radius."""
+SAMPLES = np.array([(0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3), *np.eye(3)])
 """Places on a triangle that are kept out of the eyeball, as weights of its corners."""
+
+
+def _landmarks(model: FaceModel) -> Landmarks:
+    return find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
+
+
+def find_lines(model: FaceModel) -> Int32:
+    """Return (V,): a bit for each of `LINES` that a vertex is on."""
+    marks = _landmarks(model)
+    lines = np.zeros(len(model.vertices), dtype=np.int32)
+    for bit, name in enumerate(LINES):
+        lines[marks.surface.pool[np.isin(marks.surface.number, marks.contour(name))]] |= 1 << bit
+    return lines
 
 
 def fit_tables(
@@ -172,25 +190,34 @@ class _Easing:
         motion, turning = self._motion(fap, borders, moves, unit), fap in TURNING
         if _is_sound(limiter, motion, turning):
             return None
-        own = self._fit.fixed if part.kind == "eye" else self._own_points(fap)
-        motion = self._unfold(surface, limiter, motion, own, fap)
+        motion = self._unfold(surface, limiter, motion, fap)
         return stop_at_folds(limiter, motion, turning=turning)
 
-    def _unfold(self, surface: Surface, limiter: Limiter, motion: Motion, own: Intp, fap: int) -> Motion:
-        """Return the motion with folds stretched evenly; where need be, of all points but the FAP's own (M,)."""
+    def _unfold(self, surface: Surface, limiter: Limiter, motion: Motion, fap: int) -> Motion:
+        """Return the motion with folds stretched evenly, where need be even where it should not change."""
         outside = self._outside(fap)
-        for pinned in (self._fit.fixed, own):
+        for pinned in (self._fit.fixed, self._own_points(fap)):
             eased = unfold(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
             if _is_sound(limiter, eased, fap in TURNING):
                 break
         return eased
 
     def _own_points(self, fap: int) -> Intp:
-        """Return the points whose motion tells whether a FAP is right: its own and its mate's."""
+        """Return the points whose motion must be right: the FAP's own, its mate's, those of lines."""
         mate = faps()[fap - 1].left_right_mate
         names = {name for each in (fap, mate) if each for name in faps()[each - 1].feature_points}
         bound = self._face.bound[[point_rows()[name] for name in sorted(names)]]
-        return self._fit.point[bound[bound >= 0]]
+        return np.unique(np.concatenate([self._fit.point[bound[bound >= 0]], self._on_lines, self._on_eyes]))
+
+    @cached_property
+    def _on_lines(self) -> Intp:
+        return np.unique(self._fit.point[find_lines(self._face) > 0])
+
+    @cached_property
+    def _on_eyes(self) -> Intp:
+        """Fixed points of eyeballs, which give the size of pupils."""
+        eyes = vertices_of_kinds(self._face.parts, ["eye"])
+        return np.intersect1d(self._fit.point[eyes], self._fit.fixed)
 
     def _lids(self, fap: int, part: Part, borders: Int32, moves: Float64, unit: float) -> Motion | None:
         """Return the motion of a lid, in front of the eyeball and without folds but at the eye's corners."""
@@ -198,28 +225,20 @@ class _Easing:
         side = LIDS[fap][0]
         eye = find_eyes(self._marks, self._face.parts)[side]
         limiter = limiter.without(self._corners(side))
-        own = self._margins(side)
-        motion = self._motion(fap, borders, moves, unit)
-        motion = self._unfold(surface, limiter, motion, own, fap)
+        motion = self._unfold(surface, limiter, self._motion(fap, borders, moves, unit), fap)
         if eye.measured and not eye.flat:
             profile = measure_profile(eye, self._face.parts, 0.0)
+            pinned = surface.mask(self._on_lines) | self._outside(fap)
             for _ in range(ROUNDS):
-                motion = lift_off(profile, surface, motion, surface.mask(own) | self._outside(fap))
+                motion = lift_off(profile, surface, motion, pinned)
                 if _is_sound(limiter, motion, True):
                     break
-                motion = self._unfold(surface, limiter, motion, own, fap)
+                motion = self._unfold(surface, limiter, motion, fap)
         return stop_at_folds(limiter, motion, turning=True)
-
-    def _margins(self, side: str) -> Intp:
-        """Return the points on the margins of an eye's lids."""
-        surface = self._marks.surface
-        lines = np.concatenate([self._marks.contour(f"{side} {lid} lid") for lid in ("upper", "lower")])
-        return np.unique(self._fit.point[surface.pool[np.isin(surface.number, lines)]])
 
     @cached_property
     def _marks(self) -> Landmarks:
-        face = self._face
-        return find_landmarks(weld_skin(face.parts, face.bound), face.points, face.bound)
+        return _landmarks(self._face)
 
     def _corners(self, side: str) -> Intp:
         """Return the points about an eye's corners, where skin folds."""
@@ -237,7 +256,7 @@ def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:
 
 
 def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -> Motion:
-    """Return the motion of a lid, lifted forwards where its triangles would cut the eyeball deeper than before.
+    """Return the motion of a lid, lifted forwards where its triangles would cut deeper than before.
 
     pinned: (N,) mask of vertices whose shifts must not change, as those of margins, which meet others.
     """
@@ -247,21 +266,24 @@ def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -
     triangles = surface.triangles
     triangles = triangles[moved[triangles].any(axis=1) & outside[triangles].all(axis=1)]
     free = ~pinned[triangles]
+    moves = np.einsum("sk,fk->fs", SAMPLES, free) > 0  # samples that a corner can lift
     was = np.maximum(_depth(profile, before[triangles]), 0.0)
     shifts = np.zeros((len(motion.values), *before.shape))
     shifts[:, motion.vertices] = motion.shifts
     for k in np.flatnonzero(motion.values > 0):
-        shift = shifts[k]
+        lifted = np.zeros(len(before))
         for _ in range(LIFTS):
-            now = (before + shift)[triangles]
+            now = (before + shifts[k])[triangles]
+            now[:, :, 2] += lifted[triangles]
             deep = _depth(profile, now) - was
-            deep[np.einsum("sk,fkd->fsd", SAMPLES, now)[:, :, 2] < profile.centre[2]] = 0.0
-            push = np.maximum(deep.max(axis=1, initial=0.0), 0.0)
+            deep[np.einsum("sk,fk->fs", SAMPLES, now[:, :, 2]) < profile.centre[2]] = 0.0
+            push = np.where(moves, deep, 0.0).max(axis=1, initial=0.0)
             if not push.any():
                 break
-            lift = np.zeros(len(before))
-            np.maximum.at(lift, triangles[free], np.repeat(push[:, None], 3, axis=1)[free])
-            shift[:, 2] += lift
+            more = np.zeros(len(before))
+            np.maximum.at(more, triangles[free], np.repeat(push[:, None], 3, axis=1)[free])
+            lifted = np.minimum(lifted + more, MOST_LIFT * profile.size)
+        shifts[k, :, 2] += lifted
     vertices = np.flatnonzero(shifts.any(axis=(0, 2)))
     return Motion(motion.values, vertices, shifts[:, vertices])
 

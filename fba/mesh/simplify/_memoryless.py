@@ -171,6 +171,7 @@ def simplify(
     scratch = loops.Scratch(
         np.empty(2 * loops.MAX_RING, np.int32), np.empty(4 * loops.MAX_RING + 4, np.int32),
         np.empty((len(places), 13)), np.empty((3, 4)), np.empty(3), np.empty(1),
+        np.empty(loops.MAX_RING, np.int32), np.empty(loops.MAX_RING),
     )  # fmt: skip
     done = 0
     if total:

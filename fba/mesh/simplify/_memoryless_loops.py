@@ -73,7 +73,8 @@ class History(NamedTuple):
 class Scratch(NamedTuple):
     """ring, near: int32, triangles and vertices around an edge. sums: (K, 13), of each pose: the quadratic as
     A (6), b (3), c, and the motion of one end relative to the other (3). planes: (3, 4), normals and right
-    sides. place: (3,), relative to one end. squared: (1,), the sum of the squared normals of the ring."""
+    sides. place: (3,), relative to one end. squared: (1,), the sum of the squared normals of the ring. ends,
+    ways: int32 and float64 (E,), vertices on lines nearby, and how far they are."""
 
     ring: Int32
     near: Int32
@@ -81,6 +82,8 @@ class Scratch(NamedTuple):
     planes: Float64
     place: Float64
     squared: Float64
+    ends: Int32
+    ways: Float64
 
 
 @compiled
@@ -454,11 +457,11 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
 
 @compiled
 def _cuts_line(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
-    """Return whether a way beside a line would be as short as the line when the edge from a to b collapses.
+    """Return whether a way beside a line would be shorter than the line when the edge from a to b collapses.
 
-    Such a way is an edge between two of its vertices, or two edges by another one.
+    Such a way is an edge between two of its vertices, or a few edges by the vertex that is left.
     """
-    lines, places, near = surface.lines, surface.places, scratch.near
+    lines, near, ends, ways = surface.lines, scratch.near, scratch.ends, scratch.ways
     if lines[a] != lines[b]:
         for one, other in ((a, b), (b, a)):
             for i in range(_add_neighbours(surface, one, near, 0)):
@@ -466,30 +469,64 @@ def _cuts_line(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
                 if v != other and lines[v] & lines[other] & ~lines[one]:
                     if not (_has_edge(surface, v, other) or _has_edge(surface, other, v)):
                         return True
-    count = _add_neighbours(surface, b, near, _add_neighbours(surface, a, near, 0))
-    through, place = lines[a] | lines[b], places[a, 0] + scratch.place
-    for i in range(count):
+    around = _add_neighbours(surface, b, near, _add_neighbours(surface, a, near, 0))
+    place, through, count = surface.places[a, 0] + scratch.place, lines[a] | lines[b], 0
+    if through:
+        ends[0], ways[0], count = a if lines[a] else b, 0.0, 1
+    for i in range(around):
         v = near[i]
-        for j in range(i):  # two edges by the vertex that is left
-            shared = lines[v] & lines[near[j]] & ~through
-            if shared:
-                way = _distance(places[v, 0], place) + _distance(places[near[j], 0], place)
-                if way < _line_length(surface, v, near[j], shared & -shared, way):
+        if v != a and v != b:
+            way = _distance(surface.places[v, 0], place)
+            count = _add_ways(surface, v, way, 2 if through else 1, count, scratch)
+    for i in range(count):
+        for j in range(i):
+            v, w = np.int64(ends[i]), np.int64(ends[j])
+            shared = lines[v] & lines[w]
+            if v != w and shared and (j == 0 or not shared & through):
+                way = ways[i] + ways[j]
+                if way < 0.999999 * _line_length(surface, v, w, shared & -shared, way):
                     return True
-        if through == 0 or lines[v] & through:
-            continue
-        end = a if lines[a] else b  # two edges from the vertex that is left, which is on a line
-        c = surface.first[v]
-        while c >= 0:
-            for k in range(3):
-                w = surface.triangles[c // 3, k]
-                if surface.triangles[c // 3, 0] >= 0 and w != a and w != b and lines[w] & lines[end]:
-                    shared = lines[w] & lines[end]
-                    way = _distance(places[v, 0], place) + _distance(places[v, 0], places[w, 0])
-                    if way < _line_length(surface, w, end, shared & -shared, way):
-                        return True
-            c = surface.follow[c]
     return False
+
+
+@compiled
+def _add_ways(surface: Surface, v: int, way: float, further: int, count: int, scratch: Scratch) -> int:
+    """Add the ways by v, which is a way off, to vertices on lines, over up to two more edges; return the
+    number of all."""
+    lines, places = surface.lines, surface.places
+    if lines[v]:
+        return _add_way(v, way, count, scratch)
+    c = surface.first[v]
+    while c >= 0:
+        for k in range(1, 3):
+            w = np.int64(surface.triangles[c // 3, (c % 3 + k) % 3])
+            if surface.triangles[c // 3, 0] >= 0:
+                to_w = way + _distance(places[v, 0], places[w, 0])
+                if lines[w]:
+                    count = _add_way(w, to_w, count, scratch)
+                elif further > 1:
+                    d = surface.first[w]
+                    while d >= 0:
+                        x = np.int64(surface.triangles[d // 3, (d % 3 + 1) % 3])
+                        if surface.triangles[d // 3, 0] >= 0 and lines[x]:
+                            to_x = to_w + _distance(places[w, 0], places[x, 0])
+                            count = _add_way(x, to_x, count, scratch)
+                        d = surface.follow[d]
+        c = surface.follow[c]
+    return count
+
+
+@compiled
+def _add_way(end: int, way: float, count: int, scratch: Scratch) -> int:
+    """Add a way to a vertex, unless a shorter one is known or there is no room; return the number of all."""
+    for i in range(count):
+        if scratch.ends[i] == end:
+            scratch.ways[i] = min(scratch.ways[i], way)
+            return count
+    if count < len(scratch.ends):
+        scratch.ends[count], scratch.ways[count] = end, way
+        count += 1
+    return count
 
 
 @inlined
