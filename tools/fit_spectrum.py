@@ -2,7 +2,7 @@
 
 Voices of flite speak random words of the dictionary in pocketsphinx, as they are, in noise, and as over a
 telephone; flite says when each phone is. A linear discriminant with one covariance for all visemes separates
-them. Prints which part of hundredths of a second is right in the sentences of `bench.speech`, spoken by each
+them. Prints which part of hundredths of a second is right in the sentences of `bench.spoken`, spoken by each
 voice, with weights of the other voices. --write replaces `fba/speech/spectrum.csv`.
 """
 
@@ -20,7 +20,8 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from bench.speech import SENTENCES, VOICES, add_noise, speak, telephone, visemes  # noqa: E402
+from bench.speech import add_noise, telephone, visemes  # noqa: E402
+from bench.spoken import FLITE, KNOWN, speak  # noqa: E402
 from fba.arrays import Float64, Int16, Int64  # noqa: E402
 from fba.audio import read_mono  # noqa: E402
 from fba.speech import RATE, Phone, find_shapes  # noqa: E402
@@ -112,18 +113,18 @@ def main() -> None:
     arguments = parser.parse_args()
     said = texts()
     found: dict[str, list[tuple[Float64, Int64, Float64]]] = {}
-    for voice in VOICES:
+    for voice in FLITE:
         found[voice] = []
         for sound, true in spoken(voice, said):
             for change in CHANGES:
                 found[voice].append(rows(change(sound), true))
 
     tail = np.zeros(RATE // 4, dtype=np.int16)
-    for voice in VOICES:
-        table = learn([part for other in VOICES if other != voice for part in found[other]])
+    for voice in FLITE:
+        table = learn([part for other in FLITE if other != voice for part in found[other]])
         shares = []
         for change in CHANGES:
-            sounds, visemes_said = zip(*spoken(voice, list(SENTENCES)), strict=True)
+            sounds, visemes_said = zip(*spoken(voice, list(KNOWN)), strict=True)
             spectrum, true = Spectrum(table), np.concatenate(visemes_said)
             whole = np.concatenate([*(change(sound[: len(sound) // STEP * STEP]) for sound in sounds), tail])
             judged = [

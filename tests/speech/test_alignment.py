@@ -36,7 +36,7 @@ def spoken(voice: str, text: str, folder: Path) -> tuple[Int16, list[Phone]]:
 @needs_recogniser
 @needs_flite
 def test_phones_are_found_where_they_are_spoken(tmp_path: Path) -> None:
-    """The first sentences of `bench.speech`, each of another voice; its table has all of them."""
+    """The first sentences of `bench.spoken`, each of another voice; its table has all of them."""
     starts, with_text, without = [], [], []
     for voice, text in zip(FLITE, KNOWN, strict=False):
         sound, truth = spoken(voice, text, tmp_path)
@@ -77,13 +77,13 @@ def test_a_text_that_does_not_fit_is_refused_with_the_words_that_are_missing(tmp
 @needs_recogniser
 @needs_flite
 def test_a_text_that_is_longer_or_shorter_than_the_sound_says_where(tmp_path: Path) -> None:
-    sound, truth = spoken("rms", SENTENCES[0], tmp_path)
-    more, _ = spoken("rms", SENTENCES[4], tmp_path)
-    words = split_text(SENTENCES[0])
-    longer = find_speech([sound], [*words, *split_text(SENTENCES[4])])
+    sound, truth = spoken("rms", KNOWN[0], tmp_path)
+    more, _ = spoken("rms", KNOWN[4], tmp_path)
+    words = split_text(KNOWN[0])
+    longer = find_speech([sound], [*words, *split_text(KNOWN[4])])
     assert longer.found is not None
     assert 0.25 < longer.found < 0.6
-    assert [word.text for word in longer.words][-10:] == [word.text for word in split_text(SENTENCES[4])]
+    assert [word.text for word in longer.words][-10:] == [word.text for word in split_text(KNOWN[4])]
     assert longer.words[-1].start == longer.seconds
     shorter = find_speech([np.concatenate([sound, more])], words)
     assert shorter.found is not None

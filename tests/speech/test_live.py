@@ -10,7 +10,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from bench.speech import SENTENCES, speak, visemes
+from bench.speech import visemes
+from bench.spoken import KNOWN, speak
 from fba.animation import Animation
 from fba.arrays import Int16
 from fba.audio import read_mono
@@ -111,7 +112,7 @@ def test_the_mouth_makes_what_is_said(recogniser: bool, right: float, tmp_path) 
         pytest.importorskip("pocketsphinx")
     live = LiveSpeech(recogniser=recogniser, life=0)
     shares = []
-    for text in SENTENCES[:4]:
+    for text in KNOWN[:4]:
         truth = speak("rms", text, tmp_path / "speech.wav")
         sound = np.concatenate(list(read_mono(tmp_path / "speech.wav", RATE)))
         true, begun, frames = visemes(find_shapes(truth), len(sound) / RATE), live.seconds, []

@@ -115,4 +115,3 @@ def reshape(looks: Looks, positions: Float64) -> Float64:
 
 
 COLUMNS = (("x", "y", "z"), ("dx", "dy", "dz"), ("sx", "sy", "sz"))
-

@@ -97,9 +97,7 @@ KINDS = {
 ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.95}
 
 
-def parts_and_points(
-    looks: Looks = ALEX, *, painted: bool = True
-) -> tuple[tuple[Part, ...], Float64, Int32]:
+def parts_and_points(looks: Looks = ALEX, *, painted: bool = True) -> tuple[tuple[Part, ...], Float64, Int32]:
     """Return parts, feature points (84, 3) and bound vertices (84,): a figure's head without its tables.
 
     painted: whether to paint the texture of the skin, which takes most of the time.

@@ -190,7 +190,9 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     inner = _spot(p, (17, 1, 2), 13)
     colour = _blend(colour, np.array(looks.socket), upper * 0.42 + lower * 0.30 + inner * 0.25)
     lid = near & (ring < 5.0)
-    colour = _blend(colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.75, 0))
+    colour = _blend(
+        colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.75, 0)
+    )
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.78, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.26, line)
@@ -206,7 +208,11 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Loo
     border = np.where(side > 0, 5.0, 5.1) - 1.9 * corner  # the red of the lips is narrower in the corners
     red = np.where(near, smoothstep((border + 0.55 - ring) / 1.0), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
-    lip = np.array(looks.lip) + lines[:, None] * np.array([9, 9, 8.0]) + (side > 0)[:, None] * np.array([-8, -7, -6.0])
+    lip = (
+        np.array(looks.lip)
+        + lines[:, None] * np.array([9, 9, 8.0])
+        + (side > 0)[:, None] * np.array([-8, -7, -6.0])
+    )
     colour = _blend(colour, lip, red * 0.88)
     seam = np.where(near, smoothstep((2.1 - ring) / 1.2), 0.0) * (1 - 0.6 * corner)
     colour = _blend(colour, np.array(looks.lip_line), seam * 0.8)
