@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -276,17 +277,19 @@ def _speak(text: str, sound: Path, said: _Said, outputs: Outputs) -> str:
 
 
 def _listen(sound: Path, words: Any, language: str) -> tuple[Speech, Prosody]:
-    from fba.audio import read_mono
+    from fba.audio import find_duration, read_mono
     from fba.speech import RATE, Prosody, find_speech
 
     prosody = Prosody()
+    seconds = find_duration(sound)
+    total = None if seconds is None else ceil(seconds)
     try:
-        with Progress("listening", None) as step:
+        with Progress("listening", total) as step:
             spoken = find_speech(
                 prosody.watch(read_mono(sound, RATE)),
                 words,
                 language=language,
-                progress=lambda _: step.advance(),
+                progress=lambda end: step.show(round(end), total),
             )
     except FormatError as error:
         if str(sound) in str(error):
