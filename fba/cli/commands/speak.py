@@ -136,7 +136,7 @@ class _Manner:
         'fba speak --audio talk.wav --text "What is said in it" -o talk.fba',
         "fba speak --audio talk.wav -o talk.fba    # without a text: rougher",
         "fba speak --timings cues.json --coding visemes -o talk.fba",
-        "arecord -f S16_LE -r 16000 | fba speak --audio - -o - | fba play -",
+        "arecord -f S16_LE -r 16000 | fba speak --audio - -o talk.fba",
     ),
 )
 @with_options
@@ -200,7 +200,7 @@ def _speak_live(
     if manner.coding == "visemes":
         raise click.UsageError("--audio - sends low-level FAPs; leave --coding visemes out")
     outputs = Outputs([Output("--output", output)], [STANDARD], no_clobber=no_clobber)
-    from fba.cli.live_speech import speak_live
+    from fba.cli.recordings.live_speech import speak_live
 
     speech, recorder = speak_live(
         output, raw_rate=said.pcm, rate=manner.rate, style=manner.style, life=manner.life, moods=moods

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import shutil
@@ -228,16 +229,16 @@ def test_what_is_no_sound_on_standard_input_is_refused(
 
 def test_a_reader_that_leaves_ends_it(programs: Path) -> None:
     command = [programs / "fba", "speak", "--audio", "-", "--pcm", "16000", "-o", "-"]
-    pipe = subprocess.PIPE
+    pipe, sound = subprocess.PIPE, babble(2.0).tobytes()
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, bufsize=0) as done:
         assert done.stdin is not None
         assert done.stdout is not None
         assert done.stderr is not None
-        done.stdin.write(babble(2.0).tobytes())
+        done.stdin.write(sound)
         assert done.stdout.read(100)
         done.stdout.close()
-        with pytest.raises(BrokenPipeError):
-            while True:
-                done.stdin.write(babble(1.0).tobytes())
+        with contextlib.suppress(BrokenPipeError):
+            while done.stdin.write(sound):
+                pass
         assert b"Traceback" not in done.stderr.read()
-    assert done.returncode in (1, 141)
+    assert done.returncode == 0
