@@ -67,6 +67,10 @@ ILLUSTRATIONS = {
     ("docs/capture-live.md", "fba capture livelink --serve 8080 -o face.fba"): SENT,
     ("docs/capture-live.md", "fba serve hello.fba --loop"): "serves until somebody ends it",
     ("docs/live.md", "fba play rtp://0.0.0.0:5004"): WINDOW,
+    (
+        "docs/speak.md",
+        "arecord -f S16_LE -r 16000 | fba speak --audio - -o - | fba play -",
+    ): "needs a microphone",
     ("docs/live.md", "fba capture livelink -o - | fba send - --live rtp://192.168.0.20:5004"): SENT,
     ("docs/live.md", "fba capture rtp://0.0.0.0:5004 -o talk.fba"): ARRIVING,
     (

@@ -3,7 +3,7 @@
 Nothing here knows faces, streams or devices. PyAV is imported where a file is opened.
 """
 
-from fba.audio._mono import read_mono
+from fba.audio._mono import find_duration, read_mono
 from fba.audio._pipe import RATES, Pipe, read_pipe
 from fba.audio._pyav import av_version, import_av
 from fba.audio._sound_file import CHANNELS, SoundFile, open_sound
@@ -14,6 +14,7 @@ __all__ = [
     "Pipe",
     "SoundFile",
     "av_version",
+    "find_duration",
     "import_av",
     "open_sound",
     "read_mono",

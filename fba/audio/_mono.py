@@ -12,7 +12,7 @@ import numpy as np
 from fba.arrays import Float32, Int16
 from fba.atomic import PathLike
 from fba.audio._sound_file import SoundFile
-from fba.errors import DisplayError
+from fba.errors import DisplayError, FbaError
 
 BLOCK_SECONDS = 1.0
 
@@ -32,6 +32,18 @@ def read_mono(path: PathLike, rate: int) -> Iterator[Int16]:
         while len(samples := sound.read(start, block)):
             start += len(samples)
             yield samples[:, 0].copy() if sound.mono else mix(samples)
+
+
+def find_duration(path: PathLike) -> float | None:
+    """Return the seconds that a file states; None where it does not, or cannot be read. Raises nothing."""
+    try:
+        if importlib.util.find_spec("av") is None:
+            with wave.open(str(path), "rb") as file:
+                return file.getnframes() / file.getframerate()
+        with SoundFile(path) as sound:
+            return sound.duration
+    except (FbaError, OSError, EOFError, wave.Error, ZeroDivisionError):
+        return None
 
 
 def mix(samples: Int16) -> Int16:

@@ -123,7 +123,7 @@ class Progress:
         """Show that more steps are done."""
         self._done += count
 
-    def show(self, done: int, total: int) -> None:
+    def show(self, done: int, total: int | None) -> None:
         """Show the number of steps done, and the total."""
         self._done, self._total = done, total
 

@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import resample_poly
 
 from fba.arrays import Int16
-from fba.audio import read_mono
+from fba.audio import find_duration, read_mono
 from fba.errors import DisplayError
 
 
@@ -67,6 +67,19 @@ def test_blocks_leave_no_seams(rate: int, tmp_path: Path, monkeypatch: pytest.Mo
     samples = read(path)
     assert len(samples) == len(whole)
     assert np.abs(samples - whole).max() < 1
+
+
+@pytest.mark.parametrize("pyav", [True, False])
+def test_the_duration_is_what_a_file_says(
+    pyav: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_tone(tmp_path / "tone.wav", 8000, 2)
+    (tmp_path / "text.wav").write_text("no sound")
+    if not pyav:
+        without_pyav(monkeypatch)
+    assert find_duration(tmp_path / "tone.wav") == pytest.approx(3)
+    assert find_duration(tmp_path / "text.wav") is None
+    assert find_duration(tmp_path / "none.wav") is None
 
 
 def test_other_files_need_pyav(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

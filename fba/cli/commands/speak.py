@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -135,7 +136,7 @@ class _Manner:
         'fba speak --audio talk.wav --text "What is said in it" -o talk.fba',
         "fba speak --audio talk.wav -o talk.fba    # without a text: rougher",
         "fba speak --timings cues.json --coding visemes -o talk.fba",
-        "arecord -f S16_LE -r 16000 | fba speak --audio - -o - | fba play -",
+        "arecord -f S16_LE -r 16000 | fba speak --audio - -o talk.fba",
     ),
 )
 @with_options
@@ -199,7 +200,7 @@ def _speak_live(
     if manner.coding == "visemes":
         raise click.UsageError("--audio - sends low-level FAPs; leave --coding visemes out")
     outputs = Outputs([Output("--output", output)], [STANDARD], no_clobber=no_clobber)
-    from fba.cli.live_speech import speak_live
+    from fba.cli.recordings.live_speech import speak_live
 
     speech, recorder = speak_live(
         output, raw_rate=said.pcm, rate=manner.rate, style=manner.style, life=manner.life, moods=moods
@@ -276,17 +277,19 @@ def _speak(text: str, sound: Path, said: _Said, outputs: Outputs) -> str:
 
 
 def _listen(sound: Path, words: Any, language: str) -> tuple[Speech, Prosody]:
-    from fba.audio import read_mono
+    from fba.audio import find_duration, read_mono
     from fba.speech import RATE, Prosody, find_speech
 
     prosody = Prosody()
+    seconds = find_duration(sound)
+    total = None if seconds is None else ceil(seconds)
     try:
-        with Progress("listening", None) as step:
+        with Progress("listening", total) as step:
             spoken = find_speech(
                 prosody.watch(read_mono(sound, RATE)),
                 words,
                 language=language,
-                progress=lambda _: step.advance(),
+                progress=lambda end: step.show(round(end), total),
             )
     except FormatError as error:
         if str(sound) in str(error):

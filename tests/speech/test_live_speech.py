@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import shutil
 import sys
 from fractions import Fraction
 
@@ -18,7 +19,7 @@ from fba.audio import read_mono
 from fba.errors import OptionError, UnsupportedError
 from fba.parameters import fap_numbers
 from fba.speech import RATE, LiveSpeech, find_shapes
-from tests.speech.test_alignment import needs_flite
+from speech_sounds import babble
 
 DELAY = 0.26
 """Seconds, the piece of 0.02 s that the sound is heard in among them."""
@@ -36,15 +37,6 @@ JAW, LIPS = (
     fap_numbers()["open_jaw"] - 1,
     [fap_numbers()[f"{name}_midlip"] - 1 for name in ("lower_t", "raise_b")],
 )
-
-
-def babble(seconds: float = 3.0) -> Int16:
-    """Loud and soft tones and noise that no program must be installed for."""
-    rng = np.random.default_rng(2)
-    times = np.arange(round(seconds * RATE)) / RATE
-    tones = sum(np.sin(2 * np.pi * hertz * times) for hertz in (140, 560, 1680))
-    loud = np.clip(np.sin(2 * np.pi * 3 * times), 0, 1)
-    return np.asarray(3000 * loud * tones + rng.normal(0, 40, len(times)), dtype=np.int16)
 
 
 def said(live: LiveSpeech, sound: Int16, piece: int) -> list[Animation]:
@@ -105,7 +97,7 @@ def test_a_moment_of_sound_is_a_frame(samples: int) -> None:
     assert len(list(live.finish())) == 1
 
 
-@needs_flite
+@pytest.mark.skipif(shutil.which("flite") is None, reason="flite is not installed")
 @pytest.mark.parametrize(("recogniser", "right"), [(SOURCES[0].values[0], 0.6), (False, 0.42)])
 def test_the_mouth_makes_what_is_said(recogniser: bool, right: float, tmp_path) -> None:  # type: ignore[no-untyped-def]
     if recogniser:
