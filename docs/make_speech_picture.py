@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -53,7 +54,7 @@ def main() -> UInt8:
     )
     shown = choose_shapes(find_shapes(speech.phones))
     with mpl.rc_context({"font.family": "DejaVu Sans", "text.color": INK}):
-        figure = plt.figure(figsize=(16, 6.0), dpi=100, facecolor=PAPER)
+        figure: Any = plt.figure(figsize=(16, 6.0), dpi=100, facecolor=PAPER)
         wave = figure.add_axes((0.012, 0.68, 0.976, 0.31))
         lane = figure.add_axes((0.012, 0.47, 0.976, 0.19))
         draw_wave(wave, samples)

@@ -35,7 +35,7 @@ def main() -> None:
     if program is None:
         sys.exit("flite is not installed; the sample's voice is spoken by it")
     phones: list[tuple[str, float, float]] = []
-    sound, rate = np.zeros(0, dtype=np.int16), 0
+    sound, rate = np.zeros(0), 0
     for text, begin in SAID:
         said, samples, rate = speak(program, text)
         first, last = said[0][1], said[-1][2]
