@@ -104,9 +104,9 @@ def table(
             alone = [index.search(each.mask, 1)[0] for each in pictures]
             in_order = index.search_sequence([each.mask for each in pictures])
             for name, hits in (("nearest outline", alone), ("with time", in_order)):
-                sides = [hit.view.yaw - headings[hit.number // VIEWS] for hit in hits]
+                seen_from = [hit.view.yaw - headings[hit.number // VIEWS] for hit in hits]
                 found = [poses[hit.number // VIEWS] for hit in hits]
-                results.setdefault(name, []).extend(_errors(pictures, found, sides))
+                results.setdefault(name, []).extend(_errors(pictures, found, seen_from))
             results.setdefault("nearest pose (bound)", []).extend(_bound(poses, pictures))
             results.setdefault("random pose", []).extend(_chance(poses, pictures))
     lines = [

@@ -140,7 +140,8 @@ def _background(colours: Float32) -> Float32:
     edge[[0, -1]] = edge[:, [0, -1]] = True
     rows, columns = np.nonzero(edge)
     border = colours[rows, columns]
-    terms = np.stack([y[rows] ** i * x[columns] ** j for i in range(3) for j in range(3 - i)], axis=1)
+    powers = [(i, j) for i in range(3) for j in range(3 - i)]
+    terms = np.stack([y[rows] ** i * x[columns] ** j for i, j in powers], axis=1)
     even = np.zeros((6, 3), dtype=np.float32)
     even[0] = np.median(border, axis=0)
     for _ in range(FITS):
@@ -148,8 +149,10 @@ def _background(colours: Float32) -> Float32:
         if inside.sum() < PLAIN / 2 * len(border):
             break
         even = np.linalg.lstsq(terms[inside], border[inside])[0]
-    whole = [(y**i)[:, None, None] * (x**j)[:, None] for i in range(3) for j in range(3 - i)]
-    return sum(term * colour for term, colour in zip(whole, even, strict=True))
+    result: Float32 = np.zeros_like(colours)
+    for (i, j), colour in zip(powers, even, strict=True):
+        result += (y**i)[:, None, None] * (x**j)[:, None] * colour
+    return result
 
 
 def _without_shadow(mask: Bool, colours: Float32, background: Float32) -> Bool:

@@ -23,13 +23,13 @@ def signed_distances(mask: Bool) -> Float32:
     from scipy import ndimage
 
     away = ndimage.distance_transform_edt(mask) - ndimage.distance_transform_edt(~mask)
-    result = np.clip(away - np.sign(away) / 2, -BAND, BAND).astype(np.float32)
+    result: Float32 = np.clip(away - np.sign(away) / 2, -BAND, BAND).astype(np.float32)
     for axis in (0, 1):
         used = np.flatnonzero(mask.any(axis=1 - axis))
         aside, half = divmod(mask.shape[axis] - 1 - int(used[0] + used[-1]), 2)
         result = np.roll(result, aside, axis)
         if half:
-            result = (result + np.roll(result, 1, axis)) / 2
+            result = np.asarray((result + np.roll(result, 1, axis)) / 2, dtype=np.float32)
     return result
 
 

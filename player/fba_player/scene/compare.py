@@ -243,9 +243,11 @@ class CompareScene(Timed[CompareTimeline]):
     def _placed(self, number: int, times: list[float]) -> Float64:
         """Return (3,): how far a scene is moved at its own time; a following camera follows the first."""
         if self.root == "common":
-            return self._shift(number) + self._apart_at_start(number) - self._apart_now(number, times)
+            apart = self._apart_now(number, times) - self._apart_at_start(number)
+            return np.asarray(self._shift(number) - apart)
         own = np.array(self.scenes[number].travel(times[number]))
-        return self._shift(number) + np.array(self.scenes[0].travel(times[0])) - own
+        first = np.array(self.scenes[0].travel(times[0]))
+        return np.asarray(self._shift(number) + first - own)
 
     def _apart_at_start(self, number: int) -> Float64:
         """Return (3,): from the first body's root to that of another at the start; zeros without bodies."""

@@ -7,6 +7,7 @@ import time as wall
 from collections.abc import Callable
 
 from fba.sampling import smoothstep
+from fba_player.scene.compare import CompareScene
 from fba_player.view._camera import FACE_PRESETS, Camera
 from fba_player.view.protocols import Showable
 
@@ -147,9 +148,11 @@ class Viewpoint:
         """Shift the figure into the space between panels that hide these shares of the picture's width."""
         if (left, right) == self._sides:
             return
-        self._shift_before = self._shift_now()
+        self._shift_before, before = self._shift_now(), self._shift[0]
         self._sides = (left, right)
         self._shift = self._shift_between(left, right)
+        if isinstance(self.scene, CompareScene):  # the line stays at the figures
+            self.scene.wipe = min(max(self.scene.wipe + self._shift[0] - before, 0.0), 1.0)
         self._shift_until = self._clock() + GLIDE_SECONDS if smoothly else -math.inf
 
     def reset(self, seconds: float = GLIDE_SECONDS) -> None:

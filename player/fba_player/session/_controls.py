@@ -130,8 +130,9 @@ class Controls:
     def _at_wipe(self, x: float) -> bool:
         """Return whether a pixel is at the line between two figures that are compared."""
         scene = self.session.scene
-        wiped = isinstance(scene, CompareScene) and scene.arrangement == "wipe"
-        return wiped and abs(x - scene.wipe * self.session.size[0]) <= WIPE_REACH * self.session.scale
+        if not isinstance(scene, CompareScene) or scene.arrangement != "wipe":
+            return False
+        return abs(x - scene.wipe * self.session.size[0]) <= WIPE_REACH * self.session.scale
 
     def _seek(self, x: float) -> None:
         low, high = self.bar()
