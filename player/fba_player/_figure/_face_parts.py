@@ -135,7 +135,6 @@ def coarse_shapes(model: FaceModel, part: Part, shape: FaceShape) -> tuple[Coars
             sway=np.einsum("nk,nk->n", weights, shape.sway[corners]).astype(np.float32),
             texcoords=own.texcoords if shape.texcoords is not None else None,
             wrinkle_places=None if places is None else place_wrinkles(model, own),
-            rest=None,
         )
         shapes.append(
             CoarseShape(

@@ -268,7 +268,8 @@ def build_figure(model: FaceModel) -> FaceFigure:
         rows = part_rows(model, part.name)
         shape = replace(make_shape(part, sway[rows]), wrinkle_places=place_wrinkles(model, part))
         if shape.across is None:  # single hairs are not simplified
-            shape = replace(shape, levels=coarse_shapes(model, part, shape), rest=part.vertices)
+            shape = replace(shape, casts=True)
+            shape = replace(shape, levels=coarse_shapes(model, part, shape))
         shapes[part.name] = shape
     light = FaceLight(model, deformer, sway)
     tongues = find_tongues(model)

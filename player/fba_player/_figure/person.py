@@ -181,7 +181,7 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
     open_surface = part.material.two_sided
     return replace(
         shape, scatter=float(part.kind in SCATTERING_KINDS), two_sided=open_surface, closed=not open_surface,
-        name="", coarser=detail_levels(part, carried.astype(np.float32)), rest=part.vertices,
+        name="", coarser=detail_levels(part, carried.astype(np.float32)), casts=True,
     )  # fmt: skip
 
 

@@ -21,6 +21,8 @@ MAX_FACE_ERROR_PIXELS = 0.8
 MORPH_SECONDS = 0.5
 """Seconds in which the vertices of a face move from one level of detail to another."""
 FULL = ("full", "0")
+SHADOW_ERROR = 0.0128
+"""Error (m) up to which bodies are simplified for their shadows on the ground."""
 SAMPLED_VERTICES = 24
 """Number of vertices from which the distance to the camera is taken."""
 
@@ -173,8 +175,16 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
         None if array is None else np.ascontiguousarray(array[rows])
         for array in (shape.texcoords, shape.wrinkle_places)
     )
+    assert shape.coarser is not None
+    outer = shape.coarser.triangles_within(SHADOW_ERROR)
+    if outer is not None:
+        number = np.full(len(shape.sway), -1, dtype=np.int32)
+        number[rows] = np.arange(len(rows))
+        outer = number[outer]
+        outer = np.ascontiguousarray(outer) if outer.min(initial=0) >= 0 else None
     coarser = replace(
         shape,
+        outer=outer,
         triangles=np.ascontiguousarray(corners.reshape(-1, 3), dtype=np.int32),
         colours=np.ascontiguousarray(shape.colours[rows]),
         sway=np.ascontiguousarray(shape.sway[rows]),

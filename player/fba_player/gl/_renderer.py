@@ -12,7 +12,7 @@ from fba.arrays import Float32, Float64, Int32
 from fba_player._mesh.primitives import capsule_mesh, sphere_mesh
 from fba_player.gl._annotation_renderer import ExtrasRenderer
 from fba_player.gl._antialias_region import Steps, find_steps
-from fba_player.gl._ground_shadow import ShadowCaster
+from fba_player.gl._ground_shadow import GroundShadow
 from fba_player.gl._lod import Details
 from fba_player.gl._mesh_renderer import FaceRenderer
 from fba_player.gl._resources import (
@@ -51,8 +51,7 @@ class Renderer:
     def __init__(self, context: Any) -> None:
         self._gl = context
         self._programs = {
-            name: load_program(context, name)
-            for name in ("mesh", "capsule", "eye", "studio", "shadow", "cast")
+            name: load_program(context, name) for name in ("mesh", "capsule", "eye", "studio", "shadow")
         }
         self._faces = FaceRenderer(context)
         self._studio_buffer = make_buffer(context, [-1, -1, 3, -1, -1, 3])
@@ -61,9 +60,7 @@ class Renderer:
         self._shadow = context.vertex_array(
             self._programs["shadow"], [(self._square, "2f", "in_corner"), (self._blobs, "4f/i", "in_blob")]
         )
-        self._caster = ShadowCaster()
-        self._cast = context.vertex_array(self._programs["cast"], [(self._square, "2f", "in_corner")])
-        self._darkness: Any = None
+        self._ground_shadow = GroundShadow(context)
         self._backdrop: tuple[tuple[object, ...], Any, Any] | None = None
         studio = self._programs["studio"]
         self._studio = context.vertex_array(studio, [(self._studio_buffer, "2f", "in_corner")])
@@ -117,7 +114,8 @@ class Renderer:
         gl.viewport = (0, 0, *size)
         gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
         self._set_camera(tuple(eye.tolist()), matrix_bytes(matrix), pixel)
-        self._draw_studio(view, matrix, size, (float(camera.target[0]), float(camera.target[2])))
+        drawn = replace(view, faces=self._details.choose(view.faces, eye, pixel, view.lod, now))
+        self._draw_studio(drawn, matrix, size, (float(camera.target[0]), float(camera.target[2])))
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
             self._draw_mesh(mesh)
@@ -125,7 +123,6 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        drawn = replace(view, faces=self._details.choose(view.faces, eye, pixel, view.lod, now))
         self._faces.begin(eye, matrix, pixel)
         self._faces.draw(drawn.faces)
         if view.extras is not None:
@@ -146,9 +143,7 @@ class Renderer:
         """Free all OpenGL objects."""
         self._shapes.clear()
         self._faces.close()
-        if self._darkness is not None:
-            self._darkness.release()
-        self._cast.release()
+        self._ground_shadow.close()
         self._extras.close()
         for part in (
             *(self._backdrop[:0:-1] if self._backdrop else ()), self._shadow, self._square, self._blobs,
@@ -177,7 +172,7 @@ class Renderer:
         gl = self._gl
         if view.background is not None:
             gl.clear(*view.background, 1.0, depth=1.0)
-            self._draw_shadows(view)
+            self._draw_shadows(view, matrix)
             return
         target = gl.fbo
         key = (size, view.ground, matrix.tobytes(), centre)
@@ -195,34 +190,20 @@ class Renderer:
         gl.copy_framebuffer(target, self._backdrop[2])
         target.use()
         gl.viewport = (0, 0, *size)
-        self._draw_shadows(view)
+        self._draw_shadows(view, matrix)
 
-    def _draw_shadows(self, view: View) -> None:
+    def _draw_shadows(self, view: View, matrix: Float64) -> None:
         """Draw soft shadows on the ground."""
         gl = self._gl
         blobs = np.ascontiguousarray(view.blobs[:MAX_BLOBS], dtype="f4")
         if not view.ground or not len(blobs):
             return
+        if self._ground_shadow.draw(self._faces, view.faces, view.blobs[:, :2], matrix_bytes(matrix)):
+            return
         gl.enable_only(gl.BLEND)
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
-        middle = blobs[:, :2].mean(axis=0)
-        cast = self._caster.cast(view.faces, (float(middle[0]), float(middle[1]))) if view.faces else None
-        if cast is None:
-            self._blobs.write(blobs)
-            self._shadow.render(gl.TRIANGLE_STRIP, instances=len(blobs))
-            return
-        height, width = cast.darkness.shape
-        if self._darkness is None or self._darkness.size != (width, height):
-            if self._darkness is not None:
-                self._darkness.release()
-            self._darkness = gl.texture((width, height), 1, alignment=1)
-            self._darkness.filter = (gl.LINEAR, gl.LINEAR)
-            self._darkness.repeat_x = self._darkness.repeat_y = False
-        self._darkness.write(np.ascontiguousarray(cast.darkness), alignment=1)
-        self._darkness.use(0)
-        set_uniform(self._programs["cast"], "low", cast.low)
-        set_uniform(self._programs["cast"], "high", cast.high)
-        self._cast.render(gl.TRIANGLE_STRIP)
+        self._blobs.write(blobs)
+        self._shadow.render(gl.TRIANGLE_STRIP, instances=len(blobs))
 
     def _backdrop_buffer(self, size: tuple[int, int]) -> tuple[Any, Any]:
         if self._backdrop is not None:

@@ -12,7 +12,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int32, UInt8
 from fba.compiled import compiled
 from fba_player.gl._resources import RecentlyUsed
-from fba_player.view._view import FaceMesh
+from fba_player.view._view import FaceMesh, FaceShape
 
 TILE = 8
 """Size (pixels) of the tiles that are smoothed if an outline runs through them."""
@@ -51,6 +51,11 @@ def find_edges(triangles: Int32) -> Edges:
     return Edges(np.array(triangles, dtype=np.int32, order="C"), ends, sides)
 
 
+def _find_constants(shape: FaceShape) -> tuple[Edges, Float32]:
+    """Return the edges of a shape, and a copy of its sway, as of its triangles."""
+    return find_edges(shape.triangles), np.array(shape.sway, dtype=np.float32, order="C")
+
+
 class Outliner:
     """Finds outlines; caches the edges of shapes.
 
@@ -58,7 +63,7 @@ class Outliner:
     """
 
     def __init__(self) -> None:
-        self._edges = RecentlyUsed[Edges](CACHED_SHAPES, lambda _: None)
+        self._edges = RecentlyUsed[tuple[Edges, Float32]](CACHED_SHAPES, lambda _: None)
         self._size = (1, 1)
         self._marked = np.zeros((1, 1), dtype=np.uint8)
 
@@ -78,10 +83,10 @@ class Outliner:
             raise ValueError(
                 f"{len(mesh.positions)} positions for a shape of {len(mesh.shape.sway)} vertices"
             )
-        edges = self._edges.get(mesh.shape, lambda: find_edges(mesh.shape.triangles))
+        edges, sway = self._edges.get(mesh.shape, lambda: _find_constants(mesh.shape))
         _mark(
             np.ascontiguousarray(mesh.positions, dtype=np.float32),
-            np.array(mesh.shape.sway, dtype=np.float32, order="C"),  # a copy, as of triangles
+            sway,
             np.asarray(mesh.turn, dtype=np.float64),
             np.asarray(mesh.centre, dtype=np.float64),
             np.ascontiguousarray(matrix @ mesh.matrix, dtype=np.float64),

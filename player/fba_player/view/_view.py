@@ -71,7 +71,8 @@ class FaceShape:
     tip, and 1 or -1 for its side; hairs narrower than a pixel are drawn a pixel wide and fainter. closed:
     whether the inside is never visible and not drawn. name, kind: of the model's part, "" if none begins.
     coarser: levels of detail of a body's part, None without any; levels: those of a face's, from fine to
-    coarse. rest: float32 (V, 3), positions at rest of a part that casts a shadow on the ground. smooth: False
+    coarse. casts: whether it casts a shadow on the ground. outer: int32 (F, 3), fewer
+    triangles that cast the same shadow; None for all. smooth: False
     if triangles are so large that light changes visibly within them. wrinkle_places: float32 (V, 2), where
     each vertex lies in `fba_player._mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity,
     cutoff: as of `fba.mesh._meshes.Material`.
@@ -91,7 +92,8 @@ class FaceShape:
     kind: str = ""
     coarser: DetailLevels | None = None
     levels: tuple[CoarseShape, ...] = ()
-    rest: Float32 | None = None
+    casts: bool = False
+    outer: Int32 | None = None
     smooth: bool = True
     wrinkle_places: Float32 | None = None
     alpha: Alpha = "auto"

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from fba.compiled import is_compiled
 from fba_player._mesh.primitives import sphere_mesh
-from fba_player.gl._ground_shadow import CELL, KEY_SHARE, SKY_SHARE, CastShadow, ShadowCaster
+from fba_player.gl._ground_shadow import CELLS, GroundShadow, _ground_around
+from fba_player.gl._mesh_renderer import FaceRenderer
 from fba_player.view._view import FaceMesh, FaceShape
 
-pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba there are blobs instead")
+KEY_SHARE, SKY_SHARE = 0.62, 0.85
+"""As in shaders/shaded.frag."""
 LIGHT = np.array([0.70, 0.68, 0.80]) / np.linalg.norm([0.70, 0.68, 0.80])
 
 
@@ -25,7 +28,7 @@ def ball(radius: float, centre: tuple[float, float, float]) -> FaceMesh:
         triangles.astype(np.int32),
         np.zeros((count, 4), np.float32),
         np.ones(count, np.float32),
-        rest=places,
+        casts=True,
     )
     matrix = np.eye(4)
     matrix[:3, 3] = centre
@@ -33,37 +36,51 @@ def ball(radius: float, centre: tuple[float, float, float]) -> FaceMesh:
     return FaceMesh(shape, places, vertices.astype(np.float32), light, matrix, np.zeros(3), np.zeros(3))
 
 
-def brightness_at(shadow: CastShadow, x: float, z: float) -> float:
-    column, row = int((x - shadow.low[0]) / CELL), int((z - shadow.low[1]) / CELL)
-    inside = 0 <= row < shadow.darkness.shape[0] and 0 <= column < shadow.darkness.shape[1]
-    return float(shadow.darkness[row, column]) / 255 if inside else 0.0
+class Ground:
+    """The darkness, 0..1, that meshes bring to the ground around the origin."""
+
+    def __init__(self, context: Any, *meshes: FaceMesh) -> None:
+        places = np.zeros((1, 2), dtype=np.float32)
+        self.low, self.width = _ground_around(places)
+        renderer, shadow = FaceRenderer(context), GroundShadow(context)
+        self.darkness = shadow.darkness(renderer, list(meshes), places) / 255
+        renderer.close()
+        shadow.close()
+
+    def at(self, x: float, z: float) -> float:
+        column, row = (int((at - low) / self.width * CELLS) for at, low in zip((x, z), self.low, strict=True))
+        return float(self.darkness[row, column]) if 0 <= row < CELLS and 0 <= column < CELLS else 0.0
 
 
-def test_a_shadow_lies_where_the_light_throws_it() -> None:
+def test_a_shadow_lies_where_the_light_throws_it(context: Any) -> None:
     height = 1.2
-    shadow = ShadowCaster().cast([ball(0.4, (0.0, height, 0.0))], (0.0, 0.0))
-    assert shadow is not None
+    ground = Ground(context, ball(0.4, (0.0, height, 0.0)))
     x, z = (-LIGHT[axis] / LIGHT[1] * height for axis in (0, 2))
-    assert brightness_at(shadow, x, z) == pytest.approx(KEY_SHARE, abs=0.12)  # all of the key light is hidden
-    assert brightness_at(shadow, -x, -z) < 0.03
+    assert ground.at(x, z) == pytest.approx(KEY_SHARE, abs=0.1)  # all of the key light is hidden
+    assert ground.at(-x, -z) < 0.03
     # The ball's section, thrown on the ground, is the longer the lower the light stands.
-    covered = (shadow.darkness > shadow.darkness.max() / 2).sum() * CELL**2
+    covered = (ground.darkness > KEY_SHARE / 2).sum() * (ground.width / CELLS) ** 2
     assert covered == pytest.approx(np.pi * 0.4**2 / LIGHT[1], rel=0.2)
 
 
-def test_what_touches_the_ground_darkens_it_most() -> None:
-    low, high = (ShadowCaster().cast([ball(0.3, (0.0, height, 0.0))], (0.0, 0.0)) for height in (0.28, 0.9))
-    assert low is not None
-    assert high is not None
-    assert brightness_at(low, 0.0, 0.0) > brightness_at(high, 0.0, 0.0) + 0.3
-    assert low.darkness.max() / 255 <= 1 - (1 - KEY_SHARE) * (1 - SKY_SHARE) + 0.01
+def test_what_touches_the_ground_darkens_it_most_and_sharply(context: Any) -> None:
+    low, high = (Ground(context, ball(0.3, (0.0, height, 0.0))) for height in (0.28, 0.9))
+    assert low.at(0.0, 0.0) > high.at(0.0, 0.0) + 0.3
+    assert low.darkness.max() <= 1 - (1 - KEY_SHARE) * (1 - SKY_SHARE) + 0.01
+    steepest = [
+        max(np.abs(np.diff(ground.darkness, axis=axis)).max() for axis in (0, 1)) for ground in (low, high)
+    ]
+    assert steepest[0] > 1.3 * steepest[1]
+    assert steepest[1] < 0.2  # a soft edge, without steps
 
 
-def test_a_shadow_is_reproducible_and_nothing_casts_no_shadow() -> None:
-    caster = ShadowCaster()
+def test_a_shadow_moves_smoothly_with_what_casts_it(context: Any) -> None:
+    """Ten steps of a millimetre change each piece of ground little, and no step more than the others."""
+    pictures = np.array([Ground(context, ball(0.3, (0.001 * step, 0.6, 0.0))).darkness for step in range(10)])
+    assert np.abs(np.diff(pictures, axis=0)).max() < 0.04
+
+
+def test_a_shadow_is_reproducible_and_nothing_casts_no_shadow(context: Any) -> None:
     mesh = ball(0.25, (0.3, 0.7, -0.2))
-    first, again = caster.cast([mesh], (0.3, -0.2)), caster.cast([mesh], (0.3, -0.2))
-    assert first is not None
-    assert again is not None
-    np.testing.assert_array_equal(first.darkness, again.darkness)
-    assert caster.cast([], (0.0, 0.0)) is None
+    np.testing.assert_array_equal(Ground(context, mesh).darkness, Ground(context, mesh).darkness)
+    assert not Ground(context).darkness.any()
