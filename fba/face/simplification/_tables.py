@@ -16,7 +16,14 @@ from fba.face._tables import FaceDefMesh, FaceDefTables, interval_lengths
 from fba.face.authoring.regions._eye_opening import LIDS, Profile, measure_profile
 from fba.face.authoring.regions._eyes import find_eyes
 from fba.face.authoring.surface._fold_limits import Limiter
-from fba.face.authoring.surface._motion import Motion, build_tables, fap_limits, split_by_part, unfold
+from fba.face.authoring.surface._motion import (
+    UNMOVED_DISTANCE,
+    Motion,
+    build_tables,
+    fap_limits,
+    split_by_part,
+    unfold,
+)
 from fba.face.authoring.surface._motion_limits import stop_at_folds
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
@@ -191,14 +198,15 @@ class _Easing:
         if _is_sound(limiter, motion, turning):
             return None
         motion = self._unfold(surface, limiter, motion, fap)
-        return stop_at_folds(limiter, motion, turning=turning)
+        motion = stop_at_folds(limiter, motion, turning=turning)
+        return _go_on(motion, borders, moves, unit)
 
     def _unfold(self, surface: Surface, limiter: Limiter, motion: Motion, fap: int) -> Motion:
         """Return the motion with folds stretched evenly, where need be even where it should not change."""
         outside = self._outside(fap)
         for pinned in (self._fit.fixed, self._own_points(fap)):
             eased = unfold(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
-            if _is_sound(limiter, eased, fap in TURNING):
+            if _is_sound(limiter, _moving(eased), fap in TURNING):
                 break
         return eased
 
@@ -231,10 +239,11 @@ class _Easing:
             pinned = surface.mask(self._on_lines) | self._outside(fap)
             for _ in range(ROUNDS):
                 motion = lift_off(profile, surface, motion, pinned)
-                if _is_sound(limiter, motion, True):
+                if _is_sound(limiter, _moving(motion), True):
                     break
                 motion = self._unfold(surface, limiter, motion, fap)
-        return stop_at_folds(limiter, motion, turning=True)
+        motion = stop_at_folds(limiter, _moving(motion), turning=True)
+        return _go_on(motion, borders, moves, unit)
 
     @cached_property
     def _marks(self) -> Landmarks:
@@ -246,6 +255,27 @@ class _Easing:
         ends = np.array([self._marks.point(name) for name in names])
         away = np.linalg.norm(self._fit.places[:, None] - ends, axis=2).min(axis=1)
         return np.flatnonzero(away < CORNER_RADIUS * np.linalg.norm(ends[0] - ends[1]))
+
+
+def _moving(motion: Motion) -> Motion:
+    """Return the motion without the vertices that tables leave out."""
+    moved = np.abs(motion.shifts).max(axis=(0, 2), initial=0.0) > UNMOVED_DISTANCE
+    return Motion(motion.values, motion.vertices[moved], motion.shifts[:, moved])
+
+
+def _go_on(motion: Motion, borders: Int32, moves: Float64, unit: float) -> Motion:
+    """Return the motion with that of displacements (P, K - 1, 3) beyond the limits of a FAP, which streams
+    exceed although they should not."""
+    low, high = motion.values[[0, -1]]
+    below, above = borders[borders < low][1:], borders[borders > high][:-1]
+    values = np.concatenate([below, motion.values, above])
+    shifts = [*motion.shifts[:1].repeat(len(below), axis=0), *motion.shifts]
+    shifts += [*motion.shifts[-1:].repeat(len(above), axis=0)]
+    for k, value in enumerate(values):
+        end = float(np.clip(value, low, high))
+        way = interval_lengths(borders, float(value)) - interval_lengths(borders, end)
+        shifts[k] = shifts[k] + unit * np.einsum("i,pid->pd", way, moves[motion.vertices])
+    return Motion(values, motion.vertices, np.array(shifts))
 
 
 def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:

@@ -466,16 +466,16 @@ def _cuts_line(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
         for one, other in ((a, b), (b, a)):
             for i in range(_add_neighbours(surface, one, near, 0)):
                 v = near[i]
-                if v != other and lines[v] & lines[other] & ~lines[one]:
-                    if not (_has_edge(surface, v, other) or _has_edge(surface, other, v)):
-                        return True
+                near_line = v != other and lines[v] & lines[other] & ~lines[one]
+                if near_line and not (_has_edge(surface, v, other) or _has_edge(surface, other, v)):
+                    return True
     around = _add_neighbours(surface, b, near, _add_neighbours(surface, a, near, 0))
     place, through, count = surface.places[a, 0] + scratch.place, lines[a] | lines[b], 0
     if through:
         ends[0], ways[0], count = a if lines[a] else b, 0.0, 1
     for i in range(around):
-        v = near[i]
-        if v != a and v != b:
+        v = np.int64(near[i])
+        if v not in (a, b):
             way = _distance(surface.places[v, 0], place)
             count = _add_ways(surface, v, way, 2 if through else 1, count, scratch)
     for i in range(count):
@@ -562,8 +562,8 @@ def _next_on_line(surface: Surface, v: int, before: int, line: int, skipped: int
         triangle = surface.triangles[c // 3]
         if triangle[0] >= 0:
             for k in range(3):
-                w = triangle[k]
-                if w != v and w != before and w != first and surface.lines[w] & line:
+                w = np.int64(triangle[k])
+                if w not in (v, before, first) and surface.lines[w] & line:
                     if not skipped or first >= 0:
                         return w
                     first = w

@@ -42,7 +42,8 @@ def repair_tables(model: FaceModel, plain: FaceModel, *, note: tuple[str, str] =
         if not least:
             continue
         for candidate in _candidates(model, table, others.get(fap)):
-            trial = Poser(model.with_tables((candidate,), {}), like=poser)
+            others_of_eye = (tables[each] for each in _judged_with(fap) if each != fap and each in tables)
+            trial = Poser(model.with_tables((candidate, *others_of_eye), {}), like=poser)
             errors = _count_errors(trial, fap)
             if errors < least:
                 least, tables[fap] = errors, candidate
@@ -76,9 +77,14 @@ def drop_false_pupils(model: FaceModel) -> FaceModel:
 
 
 def _count_errors(poser: Poser, fap: int) -> int:
-    """Return the errors of one FAP; of a lid, together with the other of its eye, which it must meet."""
-    pair = [each for each, (side, _) in LIDS.items() if fap in LIDS and side == LIDS[fap][0]] or [fap]
-    return count_errors(poser, pair, combined=len(pair) > 1)
+    """Return the errors of one FAP, together with those that it is judged with."""
+    together = _judged_with(fap)
+    return count_errors(poser, together, combined=len(together) > 1)
+
+
+def _judged_with(fap: int) -> list[int]:
+    """Return a FAP, with that of the other lid of its eye, which it must meet, if it is a lid's."""
+    return [each for each, (side, _) in LIDS.items() if fap in LIDS and side == LIDS[fap][0]] or [fap]
 
 
 def _candidates(
