@@ -66,6 +66,8 @@ LEAST_AREA = 0.1
 """Share of its area that a triangle keeps, seen along its neutral normal, where FAPs are at their limits."""
 MAX_ROUNDS = 150
 """Rounds in which the motion of triangles that turn over is smoothed."""
+SPREAD = 3
+"""Edges by which motion may spread while it is smoothed."""
 RIM_VERTICES = 16
 """Vertices of a pupil's rim that stay."""
 LEAST_MOTION = 1e-3
@@ -306,6 +308,8 @@ def unfold_motion(moves: Float64, limits: Float64, places: Float64, corners: Int
     `MAX_ROUNDS` stays so.
     """
     moving: Bool = np.abs(moves).max(axis=(1, 2), initial=0.0) > 0
+    for _ in range(SPREAD):
+        moving[corners[moving[corners].any(axis=1)]] = True
     used, near = np.unique(corners[moving[corners].any(axis=1)], return_inverse=True)
     corners = near.reshape(-1, 3).astype(np.int32)
     own, places, pinned = moves[used], places[used], np.isin(used, fixed)

@@ -42,7 +42,9 @@ def face(name: str = "alex") -> FaceModel:
         return head
     data = _read(name)
     if str(data["face"]) != shape_key(head.parts):
-        raise ModelError(f"the figure {name!r} was made from another built-in head; run tools/figure/make_head.py")
+        raise ModelError(
+            f"the figure {name!r} was made from another built-in head; run tools/figure/make_head.py"
+        )
     made = reshape(head, head.vertices + data["face_moves"] * STEP, data["points"].astype(np.float64))
     parts = []
     for part, tint in zip(made.parts, data["face_tints"], strict=True):
@@ -69,7 +71,9 @@ def body(name: str = "alex") -> BodyModel:
         return person
     data = _read(name)
     if str(data["body"]) != shape_key(person.parts):  # type: ignore[arg-type]
-        raise ModelError(f"the figure {name!r} was made from another built-in body; run tools/figure/make_body.py")
+        raise ModelError(
+            f"the figure {name!r} was made from another built-in body; run tools/figure/make_body.py"
+        )
     moved = person.vertices + data["body_moves"] * STEP
     parts = []
     for part, tint in zip(person.parts, data["body_tints"], strict=True):

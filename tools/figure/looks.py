@@ -18,9 +18,9 @@ class Hair:
     """Hair of the head, a layer over the scalp that is painted with strokes.
 
     sides, top: its thickness at the sides and what the top adds, metres. rise: metres from the hairline over
-    which it reaches them. lumps: how far locks stand out, metres. curly: whether strokes lie in all directions,
-    else they are combed from a parting. stroke: shortest and longest stroke, metres. colours: of the strokes,
-    sRGB, 0..255, the first also of the layer below.
+    which it reaches them. lumps: how far locks stand out, metres. curly: whether strokes lie in all
+    directions, else they are combed from a parting. stroke: shortest and longest stroke, metres. colours: of
+    the strokes, sRGB, 0..255, the first also of the layer below.
     """
 
     sides: float
@@ -115,4 +115,3 @@ def reshape(looks: Looks, positions: Float64) -> Float64:
 
 
 COLUMNS = (("x", "y", "z"), ("dx", "dy", "dz"), ("sx", "sy", "sz"))
-

@@ -20,6 +20,8 @@ import mouth
 import numpy as np
 import paint
 import sculpt
+from hair import grow, scalp
+from looks import ALEX, Looks, reshape
 from meshes import Mesh, mirror
 from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
 from subdivide import Refined, refine
@@ -31,8 +33,6 @@ from fba.face.authoring import author
 from fba.mesh import vertex_normals
 from fba.parameters import point_rows
 from fba.sampling import smoothstep
-from hair import grow, scalp
-from looks import ALEX, Looks, reshape
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
@@ -97,9 +97,7 @@ KINDS = {
 ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.95}
 
 
-def parts_and_points(
-    looks: Looks = ALEX, *, painted: bool = True
-) -> tuple[tuple[Part, ...], Float64, Int32]:
+def parts_and_points(looks: Looks = ALEX, *, painted: bool = True) -> tuple[tuple[Part, ...], Float64, Int32]:
     """Return parts, feature points (84, 3) and bound vertices (84,): a figure's head without its tables.
 
     painted: whether to paint the texture of the skin, which takes most of the time.
@@ -111,9 +109,9 @@ def parts_and_points(
     vertices, triangles, colours = garment.make_shirt(ORIGIN)
     meshes["shirt"] = vertices, triangles, colours * (*looks.shirt, 1.0)
     for name, (vertices, triangles, colours) in meshes.items():
-        vertices = _reshape_part(looks, name, vertices)
         material = Material(KINDS[name], (1.0, 1.0, 1.0), ROUGHNESS[KINDS[name]])
-        parts.append(Part(name, KINDS[name], vertices, triangles, colours=colours, material=material))
+        placed = _reshape_part(looks, name, vertices)
+        parts.append(Part(name, KINDS[name], placed, triangles, colours=colours, material=material))
     starts = dict(
         zip([p.name for p in parts], np.cumsum([0, *(len(p.vertices) for p in parts)]), strict=False)
     )

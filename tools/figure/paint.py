@@ -6,14 +6,14 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
+from hair import AXIS, combed, in_parting, noise, scalp
+from looks import ALEX, Looks
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
 from fba.arrays import Bool, Float64, Integer
 from fba.sampling import smoothstep
-from hair import AXIS, combed, in_parting, noise, scalp
-from looks import ALEX, Looks
 
 SIZE = 2048
 
@@ -154,9 +154,11 @@ LINES = (
     (((16, -39), (23, -48), (29, -58), (33, -68)), 2.2, 0.75), (((29, -75), (31, -83), (30, -92)), 2.0, 0.45),
     (((47, 0), (53, 3), (60, 8)), 0.7, 0.50), (((48, -3), (55, -4), (61, -4)), 0.7, 0.50),
     (((46, -6), (52, -10), (57, -15)), 0.7, 0.45), (((19, -10), (26, -16), (36, -16), (42, -12)), 1.0, 0.45),
-    (((-1, 34), (14, 36), (30, 40), (44, 36)), 0.9, 0.40), (((-1, 45), (14, 48), (30, 51), (42, 47)), 0.9, 0.45),
+    (((-1, 34), (14, 36), (30, 40), (44, 36)), 0.9, 0.40),
+    (((-1, 45), (14, 48), (30, 51), (42, 47)), 0.9, 0.45),
     (((-1, 56), (14, 58), (30, 60)), 0.8, 0.30), (((4, 10), (5, 17), (4.5, 25)), 0.8, 0.45),
-    (((22, -60), (21, -57)), 0.6, 0.2), (((8, -60), (8, -57)), 0.5, 0.2), (((14, -61), (14.5, -58)), 0.5, 0.2),
+    (((22, -60), (21, -57)), 0.6, 0.2), (((8, -60), (8, -57)), 0.5, 0.2),
+    (((14, -61), (14.5, -58)), 0.5, 0.2),
 )  # fmt: skip
 """Lines of an old skin."""
 
@@ -175,7 +177,7 @@ def _lines(colour: Float64, p: Float64, looks: Looks) -> Float64:
         near = (np.abs(x - path[:, 0].mean()) < 40) & (np.abs(y - path[:, 1].mean()) < 40) & (front > 0)
         distance, row = cKDTree(path).query(np.stack([x[near], y[near]], axis=1))
         fade = np.sin(np.pi * np.clip(row / 59, 0.02, 0.98)) ** 0.6 * front[near] * depth * looks.lines
-        below = np.sign((y[near] - path[row, 1]))
+        below = np.sign(y[near] - path[row, 1])
         light = np.exp(-(((distance - 2 * width) / (1.2 * width)) ** 2)) * (below < 0)
         factor = 1 - 0.30 * fade * np.exp(-((distance / width) ** 2)) + 0.09 * fade * light
         colour[near] *= factor[:, None]
@@ -190,7 +192,9 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     inner = _spot(p, (17, 1, 2), 13)
     colour = _blend(colour, np.array(looks.socket), upper * 0.42 + lower * 0.30 + inner * 0.25)
     lid = near & (ring < 5.0)
-    colour = _blend(colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.75, 0))
+    colour = _blend(
+        colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.75, 0)
+    )
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.78, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.26, line)
@@ -206,7 +210,11 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Loo
     border = np.where(side > 0, 5.0, 5.1) - 1.9 * corner  # the red of the lips is narrower in the corners
     red = np.where(near, smoothstep((border + 0.55 - ring) / 1.0), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
-    lip = np.array(looks.lip) + lines[:, None] * np.array([9, 9, 8.0]) + (side > 0)[:, None] * np.array([-8, -7, -6.0])
+    lip = (
+        np.array(looks.lip)
+        + lines[:, None] * np.array([9, 9, 8.0])
+        + (side > 0)[:, None] * np.array([-8, -7, -6.0])
+    )
     colour = _blend(colour, lip, red * 0.88)
     seam = np.where(near, smoothstep((2.1 - ring) / 1.2), 0.0) * (1 - 0.6 * corner)
     colour = _blend(colour, np.array(looks.lip_line), seam * 0.8)

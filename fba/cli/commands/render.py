@@ -313,6 +313,8 @@ def _sheet(request: _Request, output: Path, scene: Showable | None = None) -> st
                 scene, sheet, tile=size, camera=camera, start=moment.start, end=moment.end, progress=step.show
             )
         else:
-            pixels = contact_sheet(str(sheet), read_model(request.how.model, request.how.figure), tile=request.size)
+            pixels = contact_sheet(
+                str(sheet), read_model(request.how.model, request.how.figure), tile=request.size
+            )
     write_picture(output, pixels)
     return f"{pixels.shape[1]}x{pixels.shape[0]}"

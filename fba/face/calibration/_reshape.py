@@ -17,17 +17,20 @@ from fba.face.eyeball import eyeballs
 from fba.face.model import DetailLevel, FaceModel, Part, shape_key
 from fba.face.simplification import TURNING_FAPS, interval_limits, unfold_motion
 
+ROUNDS = 8
+"""Rounds of averaging with neighbours."""
+
 
 def reshape(model: FaceModel, vertices: Float64, points: Float64) -> FaceModel:
     """Return the same face with other vertices: its FaceDefTables and levels of detail are carried over.
 
-    vertices: float64 (V, 3), metres, of all parts; eyeballs may be moved and scaled, not bent. points: (84, 3)
-    feature points, of which those at vertices are taken from there. ModelError for arrays of other shapes.
+    vertices: float64 (V, 3), metres, of all parts; eyeballs may be moved and scaled, not bent. points:
+    (84, 3) feature points; those at vertices are taken from there. ModelError for arrays of other shapes.
     """
     if vertices.shape != model.vertices.shape or points.shape != model.points.shape:
         raise ModelError(
-            f"{len(model.vertices)} vertices and {len(model.points)} points are needed, each with x, y, z, not "
-            f"arrays of {vertices.shape} and {points.shape}"
+            f"{len(model.vertices)} vertices and {len(model.points)} points are needed, each with x, y, z, "
+            f"not arrays of {vertices.shape} and {points.shape}"
         )
     parts = tuple(rebuild_part(part, vertices[_rows(model, part.name)]) for part in model.parts)
     at_vertices = model.bound >= 0
@@ -64,16 +67,35 @@ def _rotations(model: FaceModel, vertices: Float64) -> Mapping[str, Float64]:
     rotations = {}
     for part in model.parts:
         if part.kind not in ("eye", "teeth", "tongue"):
-            left, _, right = np.linalg.svd(surface_stretches(part, vertices[_rows(model, part.name)]))
+            even = _even_out(surface_stretches(part, vertices[_rows(model, part.name)]), part.triangles)
+            left, _, right = np.linalg.svd(even)
             left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
             rotations[part.name] = left @ right
     return rotations
 
 
+def _even_out(stretches: Float64, triangles: Int32) -> Float64:
+    """Return stretches (V, 3, 3) averaged over the surface around: single ones of slivers are noise."""
+    from scipy.sparse import coo_array, eye_array
+
+    pairs = triangles[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2)
+    count = len(stretches)
+    beside = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
+    beside = beside + eye_array(count)
+    share = 1.0 / np.asarray(beside.sum(axis=1)).ravel()
+    rows = stretches.reshape(count, 9)
+    for _ in range(ROUNDS):
+        rows = (beside @ rows) * share[:, None]
+    return rows.reshape(-1, 3, 3)
+
+
 @dataclass(frozen=True, eq=False)
 class _Welded:
-    """The skin without its seams: places (P, 3), metres; corners (F, 3) of triangles; fixed points, which keep
-    their motion. point: (V,) the point of each vertex. first: (P,) a vertex of each point."""
+    """The skin without its seams.
+
+    places (P, 3), metres. corners (F, 3) of triangles. fixed: points that keep their motion. point: (V,) the
+    point of each vertex. first: (P,) a vertex of each point.
+    """
 
     places: Float64
     corners: Int32
@@ -83,11 +105,13 @@ class _Welded:
 
 
 def _weld(model: FaceModel, part: Part) -> _Welded:
-    places, first, inverse = np.unique(part.vertices, axis=0, return_index=True, return_inverse=True)
+    """Return the skin with one point where vertices coincide and face one way: lips that touch stay two."""
+    keys = np.column_stack([part.vertices, np.rint(np.asarray(part.normals))])
+    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     point = inverse.ravel().astype(np.int32)
     bound = model.bound - model.starts[part.name]
     fixed = np.unique(point[bound[(bound >= 0) & (bound < len(part.vertices))]])
-    return _Welded(places.astype(np.float64), point[part.triangles], fixed, point, first)
+    return _Welded(part.vertices[first].astype(np.float64), point[part.triangles], fixed, point, first)
 
 
 def _unfold(model: FaceModel, table: FaceDefTables, welded: Mapping[str, _Welded]) -> FaceDefTables:
@@ -105,8 +129,9 @@ def _unfold(model: FaceModel, table: FaceDefTables, welded: Mapping[str, _Welded
             unfold_motion(even, limits, skin.places, skin.corners, skin.fixed)
             moved = np.flatnonzero(even.any(axis=(1, 2))[skin.point]).astype(np.int32)
             even = even[skin.point[moved]].astype(np.float32)
-            mesh = FaceDefMesh(mesh.part, mesh.borders, moved, even)
-        meshes.append(mesh)
+            meshes.append(FaceDefMesh(mesh.part, mesh.borders, moved, even))
+        else:
+            meshes.append(mesh)
     return replace(table, meshes=tuple(meshes))
 
 
@@ -121,5 +146,3 @@ def _reshape_level(level: DetailLevel, model: FaceModel, now: FaceModel, vertice
     points[bound >= 0] = np.concatenate([part.vertices for part in parts])[bound[bound >= 0]]
     coarse = replace(level.model, parts=parts, points=points)
     return DetailLevel(coarse, level.parents, level.error, shape_key(now.parts))
-
-
