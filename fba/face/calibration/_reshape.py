@@ -127,7 +127,8 @@ def _unfold(model: FaceModel, table: FaceDefTables, welded: Mapping[str, _Welded
             even = moves[skin.first]
             limits = interval_limits(model, table.fap, mesh)
             unfold_motion(even, limits, skin.places, skin.corners, skin.fixed)
-            moved = np.flatnonzero(even.any(axis=(1, 2))[skin.point]).astype(np.int32)
+            moving = np.asarray(even.any(axis=(1, 2)))
+            moved = np.flatnonzero(moving[skin.point]).astype(np.int32)
             even = even[skin.point[moved]].astype(np.float32)
             meshes.append(FaceDefMesh(mesh.part, mesh.borders, moved, even))
         else:
