@@ -105,6 +105,7 @@ def shirt_folds(p: Float64) -> Float64:
     away = np.hypot(x - ARMPIT[0], y - ARMPIT[1])
     turn = np.arctan2(y - ARMPIT[1], ARMPIT[0] - x)
     pull = smoothstep((away - 0.02) / 0.04) * np.exp(-((away / 0.11) ** 2)) * (x < ARMPIT[0] + 0.02)
+    pull *= smoothstep((ARMPIT[1] + 0.03 - y) / 0.05)
     return FOLDED * (waist * np.sin(slanted * 2 * np.pi / 0.046) + 1.2 * pull * np.cos(7.0 * turn + 0.6))
 
 
