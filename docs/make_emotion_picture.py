@@ -27,6 +27,14 @@ MIXTURES = (
     "fear=60 terror=60",
 )
 
+TOLD = (
+    "joy", "smile", "delight", "anger", "sternness", "sadness", "worry", "fear", "guilt", "disgust", "sneer",
+    "contempt", "surprise", "unease", "anticipation",
+)  # fmt: skip
+"""Words whose faces are near each other."""
+ORDER = 11
+"""Seed of the order in which they are shown without names."""
+
 
 def sheet(tiles: Sequence[tuple[str, str, Float32]], columns: int, size: int = TILE) -> Image.Image:
     """Faces with a name and a note below each."""
@@ -51,6 +59,22 @@ def named() -> Image.Image:
         known = "" if one.point is None else f"{one.point[0]:g}, {one.point[1]:g}"
         tiles.append((one.name, "  ".join(filter(None, (one.family, known))), one.faps))
     return sheet(tiles, COLUMNS)
+
+
+def told_apart() -> Image.Image:
+    """Faces near each other, numbered, in an order of chance."""
+    order = np.random.default_rng(ORDER).permutation(len(TOLD))
+    return sheet([(str(k + 1), "", emotion.expression(TOLD[n]).faps) for k, n in enumerate(order)], 5, 300)
+
+
+def told_apart_named() -> Image.Image:
+    """The same faces with their names, in the order of `TOLD`; the number is that of the sheet without."""
+    order = np.random.default_rng(ORDER).permutation(len(TOLD)).tolist()
+    return sheet(
+        [(word, str(order.index(n) + 1), emotion.expression(word).faps) for n, word in enumerate(TOLD)],
+        5,
+        300,
+    )
 
 
 def measured() -> Image.Image:

@@ -33,6 +33,8 @@ PICTURES = {
     "emotion-measured.jpg": "make_emotion_picture.measured",
     "emotion-mixtures.jpg": "make_emotion_picture.mixtures",
     "emotion-named.jpg": "make_emotion_picture.named",
+    "emotion-told.jpg": "make_emotion_picture.told_apart",
+    "emotion-told-named.jpg": "make_emotion_picture.told_apart_named",
     "expressions.jpg": "make_head_pictures.expressions",
     "faces.jpg": "make_head_pictures.faces",
     "faps.jpg": "make_head_pictures.faps",

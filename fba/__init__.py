@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
     from fba import archive as archive
     from fba import audio as audio
-    from fba import body, capture, emotion, face, figures
+    from fba import body, capture, emotion, face
     from fba import carriage as carriage
     from fba import codec as codec
+    from fba import figures as figures
     from fba import formats as formats
     from fba import live as live
     from fba import parameters as parameters
@@ -63,8 +64,8 @@ _NAMES = {
 }  # fmt: skip
 """Public names by the module that they are imported from."""
 _MODULES = (
-    "archive", "audio", "body", "capture", "carriage", "codec", "emotion", "face", "figures", "formats", "live",
-    "outlines", "parameters", "persona", "planning", "player", "serving", "speech",
+    "archive", "audio", "body", "capture", "carriage", "codec", "emotion", "face", "figures", "formats",
+    "live", "outlines", "parameters", "persona", "planning", "player", "serving", "speech",
 )  # fmt: skip
 
 __all__ = [

@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import cache
 from importlib.resources import as_file, files
 from types import MappingProxyType
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
@@ -78,7 +78,8 @@ def body(name: str = "alex") -> BodyModel:
     parts = []
     for part, tint in zip(person.parts, data["body_tints"], strict=True):
         start = person.starts[part.name]
-        parts.append(_tint(rebuild_part(part, moved[start : start + len(part.vertices)]), tint))
+        placed = rebuild_part(cast("Part", part), moved[start : start + len(part.vertices)])
+        parts.append(_tint(cast("BodyPart", placed), tint))
     return replace(person, parts=tuple(parts), name=name)
 
 

@@ -12,8 +12,9 @@ from fba.body import BodyModel
 from fba.cli.options import Figure
 from fba.errors import ModelError
 from fba.face import Deformer, FaceModel
+from fba.face.authoring.surface.landmarks import find_landmarks, weld_skin
 from fba.face.checks import check_faps, check_neutral
-from fba.parameters import FAP_COUNT
+from fba.parameters import FAP_COUNT, point_rows
 
 OTHERS = [name for name in figures.FIGURES if name != "alex"]
 
@@ -29,7 +30,7 @@ def test_the_first_is_the_built_in_person() -> None:
 
 def test_an_unknown_name_says_which_there_are() -> None:
     for read in (figures.face, figures.body):
-        with pytest.raises(ModelError, match="'rut'.*alex, ruth"):
+        with pytest.raises(ModelError, match=r"'rut'.*alex, ruth"):
             read("rut")
 
 
@@ -62,7 +63,7 @@ def test_the_head_fits_the_neck_of_its_body(name: str) -> None:
     gaps = []
     for head, trunk in ((face, body), default):
         assert trunk.eyes is not None
-        pupils = head.points[[head_row("3.5"), head_row("3.6")]]
+        pupils = head.points[[point_rows()["3.5"], point_rows()["3.6"]]]
         placed = head.part("skin").vertices + (trunk.eyes - pupils).mean(axis=0)
         neck = next(part for part in trunk.parts if part.kind == "neck").vertices
         middle = neck[np.abs(neck[:, 1] - np.median(neck[:, 1])) < 0.01]
@@ -71,7 +72,17 @@ def test_the_head_fits_the_neck_of_its_body(name: str) -> None:
     assert len(body.skeleton) == len(default[1].skeleton)
 
 
-def head_row(point: str) -> int:
-    from fba.parameters import point_rows
-
-    return point_rows()[point]
+@pytest.mark.parametrize("name", OTHERS)
+def test_lids_meet_within_a_fifth_of_a_millimetre(name: str) -> None:
+    face = figures.face(name)
+    marks = find_landmarks(weld_skin(face.parts, face.bound), face.points, face.bound)
+    values = np.zeros(FAP_COUNT, np.float32)
+    values[[18, 19]], values[[20, 21]] = 600, 424
+    places = np.empty((len(marks.surface), 3))
+    places[marks.surface.number] = Deformer(face).local(values)[marks.surface.pool]
+    for side in ("left", "right"):
+        upper, lower = (places[marks.contour(f"{side} {lid} lid")] for lid in ("upper", "lower"))
+        steps = np.linspace(0, 1, 20)[:, None, None]
+        line = (lower[:-1] + steps * np.diff(lower, axis=0)).reshape(-1, 3)
+        away = np.linalg.norm(upper[:, None] - line[None], axis=2).min(axis=1)
+        assert away.max() < 0.0002, side

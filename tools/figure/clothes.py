@@ -44,6 +44,12 @@ NECKLINE = (
     (1.4982, 1.4762, 1.4652, 1.4762, 1.4982, 1.5122, 1.5172, 1.5122),
 )
 """Degrees from the front about the neck, and the height of the collar there."""
+FOLDED = 0.0062
+"""Height of folds, metres."""
+WAIST_FOLDS, KNEE, CROTCH = 1.015, 0.505, 0.845
+"""Heights about which they lie, metres."""
+ARMPIT = (0.155, 1.315)
+"""x and y from which those of the shirt spread, metres."""
 FOLD = 0.003
 """Metres by which an edge is folded in below the skin."""
 
@@ -91,6 +97,30 @@ def height_above_hem(p: Float64) -> Float64:
     return p[:, 1] - TURN_UP[0] - TURN_UP[1] * np.clip(p[:, 2] - LEG, -0.05, 0.09)
 
 
+def shirt_folds(p: Float64) -> Float64:
+    """Return (N,) metres by which folds raise the shirt at points (N, 3): from armpits, and at the waist."""
+    x, y, z = np.abs(p[:, 0]), p[:, 1], p[:, 2]
+    waist = np.exp(-(((y - WAIST_FOLDS) / 0.055) ** 2)) * smoothstep((x - 0.03) / 0.08)
+    slanted = y + 0.35 * x * np.where(z > AXIS - 0.03, 1.0, -0.6)
+    away = np.hypot(x - ARMPIT[0], y - ARMPIT[1])
+    turn = np.arctan2(y - ARMPIT[1], ARMPIT[0] - x)
+    pull = smoothstep((away - 0.02) / 0.04) * np.exp(-((away / 0.11) ** 2)) * (x < ARMPIT[0] + 0.02)
+    pull *= smoothstep((ARMPIT[1] + 0.03 - y) / 0.05)
+    return FOLDED * (waist * np.sin(slanted * 2 * np.pi / 0.046) + 1.2 * pull * np.cos(7.0 * turn + 0.6))
+
+
+def trouser_folds(p: Float64) -> Float64:
+    """Return (N,) metres by which folds raise the trousers at points (N, 3): crotch, knees, ankles."""
+    x, y, z = np.abs(p[:, 0]), p[:, 1], p[:, 2]
+    behind = 0.35 + 0.65 * smoothstep((LEG + 0.05 - z) / 0.06)
+    knee = np.exp(-(((y - KNEE) / 0.07) ** 2)) * behind * np.sin((y + 0.3 * x) * 2 * np.pi / 0.042)
+    stack = np.exp(-(((y - 0.13) / 0.06) ** 2)) * np.sin((y + 0.25 * z) * 2 * np.pi / 0.044)
+    away = np.hypot(x, y - CROTCH)
+    turn = np.arctan2(y - CROTCH, x + 1e-6)
+    pull = smoothstep((away - 0.03) / 0.05) * np.exp(-((away / 0.14) ** 2)) * np.cos(9.0 * turn)
+    return FOLDED * (knee + 1.2 * stack + 0.8 * pull)
+
+
 def make_shirt(body: Body) -> Garment:
     """Return a T-shirt."""
     p = body.person.vertices
@@ -106,6 +136,7 @@ def make_shirt(body: Body) -> Garment:
     thick = (
         0.0046 + 0.0045 * loose * ~arms + 0.004 * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
     )
+    thick += np.maximum(shirt_folds(p) * ~arms, -0.003)
     return _make_garment(body, edge_distance, kind, thick, 0.35 + 0.45 * loose, 8, SHIRT, 0.014)
 
 
@@ -125,6 +156,7 @@ def make_trousers(body: Body) -> Garment:
         + 0.0105 * below
         + 0.006 * smoothstep((0.35 - p[:, 1]) / 0.25)
     )
+    thick += np.maximum(trouser_folds(p), 0.0012 - thick)
     return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from looks import Colour
 from meshes import Mesh, tube
 
 from fba.arrays import Float64, Int64
-from looks import Colour
 
 AROUND = 40
 SCLERA = np.array([0.80, 0.76, 0.72])
@@ -19,8 +19,8 @@ VEIN = np.array([0.62, 0.30, 0.26])
 def eyeball(centre: Float64, radius: float, iris: float, tones: tuple[Colour, Colour]) -> Mesh:
     """Return an eyeball looking along +z.
 
-    The first vertex is the middle of the pupil. iris: its diameter; the pupil's is a third of it. tones: inner
-    and outer colour of the iris.
+    The first vertex is the middle of the pupil. iris: its diameter; the pupil's is a third of it. tones:
+    inner and outer colour of the iris.
     """
     edge, pupil = np.arcsin(iris / 2 / radius), np.arcsin(iris / 6 / radius)
     polar = np.concatenate([

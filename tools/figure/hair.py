@@ -6,11 +6,11 @@ import csv
 from pathlib import Path
 
 import numpy as np
+from looks import Hair
 from scipy.interpolate import PchipInterpolator
 
 from fba.arrays import Float64
 from fba.sampling import smoothstep
-from looks import Hair
 
 MIDDLE = np.array([0.0, 0.012, -0.085])
 """Point of the skull from which hair stands away."""
@@ -38,7 +38,7 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
 
 
 def height_above_hairline(positions: Float64) -> Float64:
-    """Return (N,) metres from the hairline to points (N, 3), positive on the scalp, -1 behind the ears."""
+    """Return (N,) metres above the hairline of points (N, 3): positive on the scalp, -1 behind ears."""
     with (Path(__file__).parent / "hairline.csv").open(encoding="utf-8") as file:
         line = np.array([[float(row["degrees"]), float(row["y"]) / 1000] for row in csv.DictReader(file)])
     around = np.degrees(np.arctan2(np.abs(positions[:, 0]), positions[:, 2] - AXIS))
@@ -67,7 +67,7 @@ def noise(positions: Float64, scale: float, seed: int) -> Float64:
 
 
 def combed(p: Float64) -> Float64:
-    """Return (N, 3) directions in which hair lies at points (N, 3): from the parting to the sides and back."""
+    """Return (N, 3) directions in which hair lies at points (N, 3): from the parting sideways and back."""
     side = np.where(p[:, 0] > PARTING, 1.0, -1.0)
     over = smoothstep((p[:, 1] - 0.045) / 0.045)[:, None] * smoothstep((p[:, 2] + 0.17) / 0.05)[:, None]
     across = np.stack([side, np.full(len(p), -0.25), np.full(len(p), -0.55)], axis=1)

@@ -15,13 +15,17 @@ from looks import ALEX, FIGURES, Looks, reshape
 from sculpt import ORIGIN
 
 import figure
-from fba.arrays import Float64
+from fba.arrays import Float32, Float64, Int32
 from fba.body import BodyModel
-from fba.face import FaceModel
+from fba.face import Deformer, FaceModel
+from fba.face.calibration import reshape as carry
 from fba.face.model import shape_key
+from fba.face.simplification import TURNING_FAPS
 from fba.figures import STEP
+from fba.parameters import faps
 
 BUILTIN = Path(__file__).parents[2] / "fba"
+ROUNDS = 8
 
 
 def make_figure(looks: Looks) -> dict[str, np.ndarray]:
@@ -29,11 +33,12 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
     head = FaceModel.load(BUILTIN / "face" / "builtin" / "head.glb")
     body = BodyModel.load(BUILTIN / "body" / "builtin" / "body.glb")
     parts, points, _ = make_head.parts_and_points(looks)
+    moves = steps(np.concatenate([part.vertices for part in parts]) - head.vertices)
     skin = next(part for part in parts if part.kind == "skin")
     eye = next(part for part in parts if part.kind == "eye")
     assert skin.material.texture is not None
     assert eye.colours is not None
-    offset = ORIGIN + (0.0, figure.EYE_LEVEL, 0.0)
+    offset = ORIGIN + np.array([0.0, figure.EYE_LEVEL, 0.0])
     moved = reshape(looks, body.vertices - offset) + offset
     skin_tint = linear(looks.neck) / linear(ALEX.neck)
     tints = {"shirt": looks.shirt, "trousers": looks.trousers, "shoes": looks.shoes}
@@ -41,7 +46,7 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
     plain = np.ones(3)
     return {
         "face": np.array(shape_key(head.parts)),
-        "face_moves": steps(np.concatenate([part.vertices for part in parts]) - head.vertices),
+        "face_moves": settle(head, moves, points),
         "face_tints": np.array(
             [plain if part.kind == "skin" else tints.get(part.name, plain) for part in head.parts], np.float32
         ),
@@ -57,6 +62,40 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
 def steps(moves: Float64) -> np.ndarray:
     """Return moves (V, 3) in metres as whole steps."""
     return np.rint(moves / STEP).astype(np.int16)
+
+
+def settle(head: FaceModel, moves: np.ndarray, points: Float64) -> np.ndarray:
+    """Return moves (V, 3), in steps, with which only those triangles turn over that do on the head as well.
+
+    Where three vertices lie almost in line, they are moved together.
+    """
+    known, triangles, moves = turned_over(head), head.part("skin").triangles, moves.copy()
+    for _ in range(ROUNDS):
+        over = (turned_over(carry(head, head.vertices + moves * STEP, points)) & ~known).any(axis=0)
+        if not over.any():
+            return moves
+        for corners in triangles[over]:  # keeps the shape that it has on the head
+            moves[corners] = np.rint(moves[corners].mean(axis=0))
+    raise SystemExit(f"{over.sum()} triangles turn over: change shapes.csv")
+
+
+def turned_over(face: FaceModel) -> np.ndarray:
+    """Return (L, F), which of the skin's triangles turn over at each limit of each FAP."""
+    skin, found = face.part("skin"), []
+    still = normals(face.vertices, skin.triangles)
+    for fap in faps()[2:]:
+        for limit in fap.i_limits or () if fap.number not in TURNING_FAPS else ():
+            values = np.zeros(len(faps()), np.float32)
+            values[fap.number - 1] = limit * fap.step
+            moved = normals(Deformer(face).local(values), skin.triangles)
+            found.append((still * moved).sum(axis=1) < 0)
+    return np.stack(found)
+
+
+def normals(vertices: Float32, triangles: Int32) -> Float64:
+    """Return (F, 3) normals of triangles, as long as twice their areas; the skin comes first of all parts."""
+    a, b, c = (vertices[triangles[:, k]].astype(np.float64) for k in range(3))
+    return np.cross(b - a, c - a)
 
 
 def linear(colour: tuple[float, float, float]) -> Float64:

@@ -18,23 +18,27 @@ from fba.face.model import DetailLevel, FaceModel, Part, shape_key
 from fba.parameters import faps
 
 TURNING_FAPS = (3, 19, 20, 21, 22, 47)
-"""FAPs of what turns far: their motions fold skin in tables of any face, and are left alone."""
+"""FAPs that rotate what they move: jaw, lids and the rolled tongue. A triangle may face another way then."""
 LEAST_AREA = 0.1
-"""Smallest part of its area that a triangle keeps, seen along its normal at rest."""
+"""Share of its area that a triangle keeps, seen along its neutral normal, where FAPs are at their limits."""
 MAX_ROUNDS = 150
-"""Rounds in which folds are taken out of a motion."""
+"""Rounds in which the motion of triangles that turn over is smoothed."""
+SPREAD = 3
+"""Edges by which motion may spread while it is smoothed."""
+ROUNDS = 8
+"""Rounds of averaging with neighbours."""
 
 
 def reshape(model: FaceModel, vertices: Float64, points: Float64) -> FaceModel:
     """Return the same face with other vertices: its FaceDefTables and levels of detail are carried over.
 
-    vertices: float64 (V, 3), metres, of all parts; eyeballs may be moved and scaled, not bent. points: (84, 3)
-    feature points, of which those at vertices are taken from there. ModelError for arrays of other shapes.
+    vertices: float64 (V, 3), metres, of all parts; eyeballs may be moved and scaled, not bent. points:
+    (84, 3) feature points; those at vertices are taken from there. ModelError for arrays of other shapes.
     """
     if vertices.shape != model.vertices.shape or points.shape != model.points.shape:
         raise ModelError(
-            f"{len(model.vertices)} vertices and {len(model.points)} points are needed, each with x, y, z, not "
-            f"arrays of {vertices.shape} and {points.shape}"
+            f"{len(model.vertices)} vertices and {len(model.points)} points are needed, each with x, y, z, "
+            f"not arrays of {vertices.shape} and {points.shape}"
         )
     parts = tuple(rebuild_part(part, vertices[_rows(model, part.name)]) for part in model.parts)
     at_vertices = model.bound >= 0
@@ -71,16 +75,35 @@ def _rotations(model: FaceModel, vertices: Float64) -> Mapping[str, Float64]:
     rotations = {}
     for part in model.parts:
         if part.kind not in ("eye", "teeth", "tongue"):
-            left, _, right = np.linalg.svd(surface_stretches(part, vertices[_rows(model, part.name)]))
+            even = _even_out(surface_stretches(part, vertices[_rows(model, part.name)]), part.triangles)
+            left, _, right = np.linalg.svd(even)
             left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
             rotations[part.name] = left @ right
     return rotations
 
 
+def _even_out(stretches: Float64, triangles: Int32) -> Float64:
+    """Return stretches (V, 3, 3) averaged over the surface around: single ones of slivers are noise."""
+    from scipy.sparse import coo_array, eye_array
+
+    pairs = triangles[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2)
+    count = len(stretches)
+    beside = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
+    beside = beside + eye_array(count)
+    share = 1.0 / np.asarray(beside.sum(axis=1)).ravel()
+    rows = stretches.reshape(count, 9)
+    for _ in range(ROUNDS):
+        rows = (beside @ rows) * share[:, None]
+    return rows.reshape(-1, 3, 3)
+
+
 @dataclass(frozen=True, eq=False)
 class _Welded:
-    """The skin without its seams: places (P, 3), metres; corners (F, 3) of triangles; fixed points, which keep
-    their motion. point: (V,) the point of each vertex. first: (P,) a vertex of each point."""
+    """The skin without its seams.
+
+    places (P, 3), metres. corners (F, 3) of triangles. fixed: points that keep their motion. point: (V,) the
+    point of each vertex. first: (P,) a vertex of each point.
+    """
 
     places: Float64
     corners: Int32
@@ -90,11 +113,13 @@ class _Welded:
 
 
 def _weld(model: FaceModel, part: Part) -> _Welded:
-    places, first, inverse = np.unique(part.vertices, axis=0, return_index=True, return_inverse=True)
+    """Return the skin with one point where vertices coincide and face one way: lips that touch stay two."""
+    keys = np.column_stack([part.vertices, np.rint(np.asarray(part.normals))])
+    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     point = inverse.ravel().astype(np.int32)
     bound = model.bound - model.starts[part.name]
     fixed = np.unique(point[bound[(bound >= 0) & (bound < len(part.vertices))]])
-    return _Welded(places.astype(np.float64), point[part.triangles], fixed, point, first)
+    return _Welded(part.vertices[first].astype(np.float64), point[part.triangles], fixed, point, first)
 
 
 def _unfold(model: FaceModel, table: FaceDefTables, welded: Mapping[str, _Welded]) -> FaceDefTables:
@@ -110,11 +135,26 @@ def _unfold(model: FaceModel, table: FaceDefTables, welded: Mapping[str, _Welded
             even = moves[skin.first]
             limits = _interval_limits(model, table.fap, mesh)
             _unfold_motion(even, limits, skin.places, skin.corners, skin.fixed)
-            moved = np.flatnonzero(even.any(axis=(1, 2))[skin.point]).astype(np.int32)
+            moving = np.asarray(even.any(axis=(1, 2)))
+            moved = np.flatnonzero(moving[skin.point]).astype(np.int32)
             even = even[skin.point[moved]].astype(np.float32)
-            mesh = FaceDefMesh(mesh.part, mesh.borders, moved, even)
-        meshes.append(mesh)
+            meshes.append(FaceDefMesh(mesh.part, mesh.borders, moved, even))
+        else:
+            meshes.append(mesh)
     return replace(table, meshes=tuple(meshes))
+
+
+def _reshape_level(level: DetailLevel, model: FaceModel, now: FaceModel, vertices: Float64) -> DetailLevel:
+    """Return a level of the reshaped face: each vertex moves as those that it stands for, on average."""
+    count = np.bincount(level.parents, minlength=len(level.model.vertices))
+    moves = vertices - model.vertices
+    total = np.stack([np.bincount(level.parents, moves[:, k], len(count)) for k in range(3)], axis=1)
+    moved = level.model.vertices + total / np.maximum(count, 1)[:, None]
+    parts = tuple(rebuild_part(part, moved[_rows(level.model, part.name)]) for part in level.model.parts)
+    points, bound = now.points.copy(), level.model.bound
+    points[bound >= 0] = np.concatenate([part.vertices for part in parts])[bound[bound >= 0]]
+    coarse = replace(level.model, parts=parts, points=points)
+    return DetailLevel(coarse, level.parents, level.error, shape_key(now.parts))
 
 
 def _interval_limits(model: FaceModel, fap: int, mesh: FaceDefMesh) -> Float64:
@@ -132,6 +172,8 @@ def _unfold_motion(moves: Float64, limits: Float64, places: Float64, corners: In
     `MAX_ROUNDS` stays so.
     """
     moving: Bool = np.abs(moves).max(axis=(1, 2), initial=0.0) > 0
+    for _ in range(SPREAD):
+        moving[corners[moving[corners].any(axis=1)]] = True
     used, near = np.unique(corners[moving[corners].any(axis=1)], return_inverse=True)
     corners = near.reshape(-1, 3).astype(np.int32)
     own, places, pinned = moves[used], places[used], np.isin(used, fixed)
@@ -158,16 +200,3 @@ def _unfold_motion(moves: Float64, limits: Float64, places: Float64, corners: In
 def _normals(places: Float64, corners: Int32) -> Float64:
     a, b, c = (places[corners[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
-
-
-def _reshape_level(level: DetailLevel, model: FaceModel, now: FaceModel, vertices: Float64) -> DetailLevel:
-    """Return a level of the reshaped face: each vertex moves as those that it stands for, on average."""
-    count = np.bincount(level.parents, minlength=len(level.model.vertices))
-    moves = vertices - model.vertices
-    total = np.stack([np.bincount(level.parents, moves[:, k], len(count)) for k in range(3)], axis=1)
-    moved = level.model.vertices + total / np.maximum(count, 1)[:, None]
-    parts = tuple(rebuild_part(part, moved[_rows(level.model, part.name)]) for part in level.model.parts)
-    points, bound = now.points.copy(), level.model.bound
-    points[bound >= 0] = np.concatenate([part.vertices for part in parts])[bound[bound >= 0]]
-    coarse = replace(level.model, parts=parts, points=points)
-    return DetailLevel(coarse, level.parents, level.error, shape_key(now.parts))
