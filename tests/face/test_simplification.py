@@ -78,9 +78,9 @@ def test_a_level_within_an_error(made: FaceSimplification) -> None:
     assert len(level.triangles) < len(made.model.triangles) / 2
 
 
-@pytest.mark.parametrize("faces", [22508, 11807, 3690, 2141, 1929, 1307, 680])
+@pytest.mark.parametrize("faces", [22508, 11807, 3690, 2141, 1929, 1307])
 def test_every_level_is_valid(faces: int) -> None:
-    """`fba model validate` finds no error: 61, 32 and 10 %, and the stages of the source."""
+    """`fba model validate` finds no error: 61, 32 and 10 %, and stages of the source."""
     made = simplify_face(replace(FaceModel.default(), levels=()), faces)
     small = made.build(made.mesh.level(faces)).model
     findings = [*check_neutral(small), *check_faps(small)]
