@@ -29,7 +29,7 @@ COSINE = float(np.cos(np.radians(1.0)))
 MIN_TURN_COSINE = 0.2
 """No triangle may turn by more than the angle of this cosine, in any pose."""
 MIN_COMPACTNESS = 0.1
-"""No triangle may become less compact than this, where 1 is that of an equilateral one."""
+"""No triangle becomes less compact than this, 1 for an equilateral one, while others can go."""
 FREE, ON_LINE, PINNED = 0, 1, 2
 """Vertices that may move; those on a border or seam, which only collapse along it; those that stay."""
 
@@ -595,7 +595,9 @@ def _on_border(surface: Surface, v: int) -> bool:
 
 
 @compiled
-def _turns_over(surface: Surface, a: int, b: int, t: float, count: int, scratch: Scratch) -> bool:
+def _turns_over(
+    surface: Surface, a: int, b: int, t: float, count: int, least: float, scratch: Scratch
+) -> bool:
     """Return whether a triangle would turn too far in a pose, lose its area, or become a sliver at rest."""
     places, place = surface.places, scratch.place
     for i in range(count):
@@ -629,7 +631,7 @@ def _turns_over(surface: Surface, a: int, b: int, t: float, count: int, scratch:
                 edge = ex * ex + ey * ey + ez * ez
                 was = np.sqrt(before) / (edge + _square(ux, uy, uz) + _square(ux - ex, uy - ey, uz - ez))
                 now = np.sqrt(after) / (edge + _square(wx, wy, wz) + _square(wx - ex, wy - ey, wz - ez))
-                if now < was and now < MIN_COMPACTNESS / (2 * np.sqrt(3.0)):
+                if now < was and now < least / (2 * np.sqrt(3.0)):
                     return True
     return False
 
@@ -650,8 +652,10 @@ def collapse_edges(
     edge of a border goes, if there is any. Return the number of collapses in the history.
     """
     triangles, version = surface.triangles, surface.version
-    before = -1
-    while faces > target and before != done:
+    before, least = -1, MIN_COMPACTNESS
+    while faces > target and (before != done or least > 0.0):
+        if before == done:
+            least = 0.0  # slivers are better than more triangles than asked for
         before = done
         heap: list[tuple[float, Any, Any, Any]] = [(0.0, np.int64(0), np.int64(0), np.int64(0))]
         heap.pop()
@@ -677,9 +681,9 @@ def collapse_edges(
             for i in range(count):
                 corners = triangles[scratch.ring[i]]
                 lost += _corner_of(corners, a) >= 0 and _corner_of(corners, b) >= 0
-            if faces - lost < target or _turns_over(surface, a, b, along, count, scratch):
+            if faces - lost < target or _turns_over(surface, a, b, along, count, least, scratch):
                 continue
-            if not _is_valid(surface, a, b, scratch) or _cuts_line(surface, a, b, scratch):
+            if not _is_valid(surface, a, b, scratch) or (least > 0.0 and _cuts_line(surface, a, b, scratch)):
                 continue
             kind, other = surface.kind[a], surface.kind[b]
             if other > kind or (other == kind and kind != FREE and along > 0.0):
