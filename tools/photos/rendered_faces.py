@@ -6,6 +6,7 @@ import io
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 from PIL import Image
@@ -95,7 +96,7 @@ def _coloured(part: Part, random: np.random.Generator) -> Part:
 
 def _photographed(head: FaceModel, random: np.random.Generator) -> Iterator[tuple[UInt8, Float64]]:
     """Yield pictures of a head from several sides, in other light and with other faces."""
-    scene = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)), model=head)
+    scene = player.Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model=head)
     scene.show("background", "transparent")
     deform, row = Deformer(head), point_rows()
     friendly = [one.faps for one in expressions() if one.family == "joy"]
@@ -170,4 +171,5 @@ def _exposed(pixels: Float64, random: np.random.Generator) -> UInt8:
     ramp = 1 + random.uniform(-0.45, 0.45) * across + random.uniform(-0.3, 0.3) * down
     lit = 255 * (np.clip(pixels / 255 * ramp[..., None], 0, 1) ** random.uniform(0.6, 1.6))
     lit = gaussian_filter(lit, (*[random.uniform(0, 1.5)] * 2, 0))
-    return np.clip(lit + random.normal(0, random.uniform(0, 8), lit.shape), 0, 255).astype(np.uint8)
+    noisy = lit + random.normal(0, random.uniform(0, 8), lit.shape)
+    return np.asarray(np.clip(noisy, 0, 255), dtype=np.uint8)

@@ -3,7 +3,7 @@
 The template of a whole face, with the distance from the space of its eigenvectors, is that of Karpouzis,
 section 7.3, and so are pupils by brightness. The other points come from a cascade of linear regressions on
 gradients (X. Xiong and F. De la Torre, "Supervised descent method", 2013): templates, Gabor phases and
-eigenfeatures of single points, his way, left them half as far off again.
+eigenfeatures of single points, his way, left those of the eyes nearly twice as far off.
 `tools/photos/learn_features.py` makes the data.
 """
 
