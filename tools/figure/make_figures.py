@@ -19,8 +19,8 @@ from fba.arrays import Float32, Float64, Int32
 from fba.body import BodyModel
 from fba.face import Deformer, FaceModel
 from fba.face.calibration import reshape as carry
+from fba.face.checks._fap_checks import TURNING
 from fba.face.model import shape_key
-from fba.face.simplification import TURNING_FAPS
 from fba.figures import STEP
 from fba.parameters import faps
 
@@ -84,7 +84,7 @@ def turned_over(face: FaceModel) -> np.ndarray:
     skin, found = face.part("skin"), []
     still = normals(face.vertices, skin.triangles)
     for fap in faps()[2:]:
-        for limit in fap.i_limits or () if fap.number not in TURNING_FAPS else ():
+        for limit in fap.i_limits or () if fap.number not in TURNING else ():
             values = np.zeros(len(faps()), np.float32)
             values[fap.number - 1] = limit * fap.step
             moved = normals(Deformer(face).local(values), skin.triangles)

@@ -13,12 +13,11 @@ from fba.face._tables import FaceDefMesh, FaceDefTables, interval_lengths
 from fba.face.calibration._carry import carry_tables, surface_stretches
 from fba.face.calibration._eyes import FittedEye
 from fba.face.calibration._shape import Shape, fit_size, rebuild_part
+from fba.face.checks._fap_checks import TURNING
 from fba.face.eyeball import eyeballs
 from fba.face.model import DetailLevel, FaceModel, Part, shape_key
 from fba.parameters import faps
 
-TURNING_FAPS = (3, 19, 20, 21, 22, 47)
-"""FAPs that rotate what they move: jaw, lids and the rolled tongue. A triangle may face another way then."""
 LEAST_AREA = 0.1
 """Share of its area that a triangle keeps, seen along its neutral normal, where FAPs are at their limits."""
 MAX_ROUNDS = 150
@@ -124,7 +123,7 @@ def _weld(model: FaceModel, part: Part) -> _Welded:
 
 def _unfold(model: FaceModel, table: FaceDefTables, welded: Mapping[str, _Welded]) -> FaceDefTables:
     """Return a table of the model whose skin does not fold at the limits of the FAP."""
-    if table.fap in TURNING_FAPS:
+    if table.fap in TURNING:
         return table
     meshes = []
     for mesh in table.meshes:
