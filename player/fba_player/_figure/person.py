@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -186,7 +186,7 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
 
 
 def _mesh_in_world(
-    shape: FaceShape, rows: slice, positions: Float32, normals: Float32, light: Float32, **more: Float32
+    shape: FaceShape, rows: slice, positions: Float32, normals: Float32, light: Float32, **more: Any
 ) -> FaceMesh:
     """Return a part, cut from its model's arrays (V, 3), (V, 3), (V, 4) in the world. more: other fields."""
     return FaceMesh(shape, positions[rows], normals[rows], light[rows], WORLD, NO_TURN, NO_TURN, **more)
