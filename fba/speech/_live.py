@@ -48,7 +48,7 @@ PRIOR, MEMORY = 60.0, 600.0
 OWN_PRIOR = 500
 """Frames for which pocketsphinx lets a mean cepstrum count that it is given."""
 SPOKEN = -50.0
-"""dB below full scale from which on a sound counts for the mean cepstrum."""
+"""dB below full scale: only louder sound counts for the mean cepstrum."""
 SHORT_CLOSURE = 0.04
 """Seconds below which the spectrum alone does not show that lips meet."""
 

@@ -25,7 +25,7 @@ OFFSETS = (-6, -3, 0, 3, 6)
 """Hundredths of a second from the one that is judged to those whose levels are weighed."""
 SMOOTH = 2
 """Hundredths of a second before and after whose scores count, too."""
-REACH = OFFSETS[-1] + SMOOTH
+LOOK_AHEAD = OFFSETS[-1] + SMOOTH
 """Hundredths of a second that must be known before and behind the one that is judged."""
 FLOOR = -40.0
 """dB below the mean of speech: all that is softer counts as silence."""
@@ -89,7 +89,7 @@ class Spectrum:
         self._sum, self._weight = usual * PRIOR, PRIOR
         self._loudest = float(usual.max())
         self._sound: Int16 = np.zeros((WINDOW - STEP) // 2, dtype=np.int16)
-        self._levels: Float64 = np.zeros((REACH, BANDS))  # of the rows that are still needed
+        self._levels: Float64 = np.zeros((LOOK_AHEAD, BANDS))  # of the rows that are still needed
         self._judged = 0
 
     def push(self, sound: Int16) -> list[Phone]:
@@ -101,15 +101,15 @@ class Spectrum:
         levels = measure_bands(heard)
         self._sound = heard[len(levels) * STEP :]
         rows = np.concatenate([self._levels, levels])
-        count = len(rows) - 2 * REACH
+        count = len(rows) - 2 * LOOK_AHEAD
         if count <= 0:
             self._levels = rows
             return []
         self._levels = rows[count:]
-        loud = rows[REACH : REACH + count].max(axis=1)
+        loud = rows[LOOK_AHEAD : LOOK_AHEAD + count].max(axis=1)
         self._loudest = max(self._loudest - FORGET * count, float(loud.max()))
         spoken = (loud > self._loudest - QUIET) & (loud > SILENT)
-        self._learn(rows[REACH : REACH + count][spoken])
+        self._learn(rows[LOOK_AHEAD : LOOK_AHEAD + count][spoken])
         scores = gather(rows - self._sum / self._weight) @ self._weights + self._constants
         smooth = np.lib.stride_tricks.sliding_window_view(scores, 2 * SMOOTH + 1, axis=0).sum(axis=-1)
         visemes = np.where(spoken, smooth.argmax(axis=1), 0)
