@@ -94,7 +94,7 @@ KINDS = {
     "eye_left": "eye", "eye_right": "eye", "teeth_upper": "teeth", "teeth_lower": "teeth", "tongue": "tongue",
     "lashes_left": "lash", "lashes_right": "lash", "shirt": "other",
 }  # fmt: skip
-ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.3, "lash": 0.65, "other": 0.95}
+ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.6, "lash": 0.65, "other": 0.95}
 
 
 def parts_and_points(looks: Looks = ALEX, *, painted: bool = True) -> tuple[tuple[Part, ...], Float64, Int32]:
