@@ -12,14 +12,14 @@ from fba.arrays import Bool, Float32, Float64, Int32
 from fba.cache import load_or_make, make_key
 from fba.compiled import is_compiled
 
-TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064)
+TOLERANCES = (0.0001, 0.0002, 0.0004, 0.0008, 0.0016, 0.0032, 0.0064, 0.0128, 0.0256)
 """Root-mean-square errors of the levels of detail, metres."""
 MIN_TRIANGLES = 200
 """Meshes with fewer triangles than this are not simplified."""
 MAX_PASSES = 40
 MIN_REMOVED_SHARE = 0.004
 """A pass that removes less than this share of the vertices is the last one of its level."""
-CACHE_VERSION = "2"
+CACHE_VERSION = "3"
 """Cache version; increment when `simplify_by_quadrics` gives other results."""
 
 

@@ -105,13 +105,14 @@ class FaceLight:
         lights: as `_lights` returns them for the turned head and, where it differs, for one at rest. out:
         (N,) for each tongue, how far it is out.
         """
-        shut, wide, near, partly = self._tables
+        (shut, bent, wide), near, partly = self._tables
         light = _reaching(shut, lights[0])
         if len(lights) > 1:
-            still = _reaching(shut[:, partly], lights[1])
+            still = _reaching(bent, lights[1])
             light[partly] = still + self._sway[partly, None] * (light[partly] - still)
         if share > 0.0 and len(near):
-            light[near] += np.float32(share) * (_reaching(wide, lights[0]) - light[near])
+            before = light.take(near, axis=0)
+            light[near] = before + np.float32(share) * (_reaching(wide, lights[0]) - before)
         # Teeth get more light than falls in, as a photographer would have it.
         for rows in self._teeth if share > 0.0 else ():
             light[rows, :2] += np.float32(TEETH_FILL_SHARE * share) * (1 - light[rows, :2])
@@ -121,15 +122,15 @@ class FaceLight:
         return light
 
     @cached_property
-    def _tables(self) -> tuple[Float32, Float32, Intp, Intp]:
-        """Visibility with the mouth shut (33, V), and wide open (33, M) at vertices (M,); vertices (N,) that
-        turn with the head only partly."""
-        near = np.flatnonzero(self.baked.near)
+    def _tables(self) -> tuple[tuple[Float32, Float32, Float32], Intp, Intp]:
+        """Visibility with the mouth shut (33, V), the same (33, N) where vertices turn only partly with the
+        head, and with it wide open (33, M) near it; vertices (M,) near the mouth, and those (N,)."""
+        near, partly = np.flatnonzero(self.baked.near), np.flatnonzero(self._sway < 1)
         shut, wide = (
             np.concatenate([seen.light, seen.through, seen.open[:, None]], axis=1).T.copy()
             for seen in (self.baked.shut, self.baked.wide)
         )
-        return shut, wide[:, near], near, np.flatnonzero(self._sway < 1)
+        return (shut, shut[:, partly], wide[:, near]), near, partly
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:
@@ -259,10 +260,10 @@ def _reaching(visibility: Float32, lights: Float32) -> Float32:
     lights: (2, 16), as of `_lights`. By einsum: threads of linear algebra would keep the processors from
     those that draw.
     """
-    (key, rim), light = lights, np.empty((visibility.shape[1], 4), dtype=np.float32)
+    (key, rim), light = lights, np.empty((4, visibility.shape[1]), dtype=np.float32)
     free, through = visibility[:HARMONICS], visibility[HARMONICS:-1]
-    np.einsum("kn,k->n", free, key, out=light[:, 0])
-    np.einsum("kn,k->n", through, rim, out=light[:, 2])
-    np.einsum("kn,k->n", free, rim, out=light[:, 3])
-    light[:, 1] = visibility[-1]
-    return np.asarray(np.clip(light, 0.0, 1.0, out=light))
+    np.einsum("kn,k->n", free, key, out=light[0])
+    np.einsum("kn,k->n", through, rim, out=light[2])
+    np.einsum("kn,k->n", free, rim, out=light[3])
+    light[1] = visibility[-1]
+    return np.ascontiguousarray(np.clip(light, 0.0, 1.0, out=light).T)

@@ -11,6 +11,7 @@ from fba.arrays import Bool, Float32, Float64
 from fba.body import AttachedHead, BodyModel, BodyPart, attach_head
 from fba.body.head_attachment import skull_of
 from fba.face import Part
+from fba.mesh.simplify import TOLERANCES, DetailLevels
 from fba.parameters import point_rows
 from fba_player._figure._face_parts import detail_levels, keep_triangles, make_shape, part_rows
 from fba_player._figure.body_light import BodyLight, build_body_light
@@ -169,8 +170,24 @@ def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]
             continue
         visible = keep_triangles(shape, ~head.hidden[figure.rows(name)], whole=False)
         if len(visible.triangles):
-            shapes[name] = visible
+            shapes[name] = _cast_coarsely(visible, part)
     return shapes
+
+
+def _cast_coarsely(shape: FaceShape, part: Part) -> FaceShape:
+    """Return a part of a face of which all levels of detail cast the shadow of a much coarser mesh."""
+    if not (shape.casts and shape.levels):
+        return shape
+    last = shape.levels[-1]
+    points = np.einsum("nk,nkd->nd", last.weights, part.vertices[last.rows]).astype(np.float32)
+    outer = DetailLevels(points, 1, last.shape.triangles).triangles_within(TOLERANCES[-1])
+    if outer is None:
+        return shape
+    outer = last.first[outer].astype(np.int32)  # of the full part
+    levels = tuple(
+        replace(level, shape=replace(level.shape, outer=level.parents[outer])) for level in shape.levels
+    )
+    return replace(shape, outer=outer, levels=levels)
 
 
 def _shape(part: BodyPart, joints: int) -> FaceShape:

@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Float32, UInt8
+from fba.arrays import Float32, Int32, Intp, UInt8
 from fba_player._figure.face_light import KEY_DIRECTION
-from fba_player.gl._mesh_renderer import FaceRenderer
-from fba_player.gl._resources import load_program, set_uniform
-from fba_player.view._view import FaceMesh
+from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniform, write_buffer
+from fba_player.view._view import FaceMesh, FaceShape
 
-HEIGHTS = 256
+HEIGHTS = 128
 """Texels of the map of heights along each side."""
 CELLS = 64
 """Texels of the darkness along each side."""
@@ -27,6 +26,8 @@ INNER_KINDS = ("teeth", "tongue", "mouth", "eye")
 """Kinds of parts that lie inside others and cast no shadow."""
 INSTANCES = 2
 """Lights along which triangles are thrown: the key light and the sky."""
+CACHED_SHAPES = 512
+"""Number of shapes whose casting vertices are cached."""
 
 
 class GroundShadow:
@@ -41,6 +42,9 @@ class GroundShadow:
             texture.repeat_x = texture.repeat_y = False
         self._thrown = context.framebuffer([self._heights])
         self._shaded = context.framebuffer([self._darkness])
+        self._shapes = RecentlyUsed[tuple[Intp, Int32]](CACHED_SHAPES, lambda _: None)
+        self._thrown_parts: list[Any] = []
+        self._thrown_shapes: list[FaceShape] = []
         self._square = context.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4").tobytes())
         self._programs = {name: load_program(context, name) for name in ("thrown", "shaded", "cast")}
         self._arrays = {
@@ -48,7 +52,7 @@ class GroundShadow:
             for name in ("shaded", "cast")
         }
 
-    def draw(self, faces: FaceRenderer, meshes: list[FaceMesh], places: Float32, camera: bytes) -> bool:
+    def draw(self, meshes: list[FaceMesh], places: Float32, camera: bytes) -> bool:
         """Draw the shadow of meshes around `places` (N, 2), x and z, into the bound framebuffer.
 
         camera: the matrix to clip space. Returns whether there are any that cast one.
@@ -58,7 +62,7 @@ class GroundShadow:
             return False
         gl, target, viewport = self._gl, self._gl.fbo, self._gl.viewport
         low, width = _ground_around(places)
-        self._find(faces, casting, low, width)
+        self._find(casting, low, width)
         target.use()
         gl.viewport = viewport
         gl.enable_only(gl.BLEND)
@@ -69,14 +73,12 @@ class GroundShadow:
         self._arrays["cast"].render(gl.TRIANGLE_STRIP)
         return True
 
-    def darkness(self, faces: FaceRenderer, meshes: list[FaceMesh], places: Float32) -> UInt8:
+    def darkness(self, meshes: list[FaceMesh], places: Float32) -> UInt8:
         """Return uint8 (CELLS, CELLS): the darkness of the ground that `draw` draws, rows along z."""
-        self._find(faces, [mesh for mesh in meshes if _casts(mesh)], *_ground_around(places))
+        self._find([mesh for mesh in meshes if _casts(mesh)], *_ground_around(places))
         return np.frombuffer(self._darkness.read(alignment=1), np.uint8).reshape(CELLS, CELLS)
 
-    def _find(
-        self, faces: FaceRenderer, casting: list[FaceMesh], low: tuple[float, float], width: float
-    ) -> None:
+    def _find(self, casting: list[FaceMesh], low: tuple[float, float], width: float) -> None:
         """Find the darkness of the ground from `low` on."""
         import moderngl
 
@@ -89,7 +91,8 @@ class GroundShadow:
         gl.blend_equation = moderngl.MAX
         set_uniform(self._programs["thrown"], "low", low)
         set_uniform(self._programs["thrown"], "width", width)
-        faces.draw_positions(casting, self._programs["thrown"], INSTANCES)
+        if casting:
+            self._throw(casting)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(gl.NOTHING)
         self._heights.build_mipmaps()
@@ -100,16 +103,51 @@ class GroundShadow:
         set_uniform(self._programs["shaded"], "width", width)
         self._arrays["shaded"].render(gl.TRIANGLE_STRIP)
 
+    def _throw(self, casting: list[FaceMesh]) -> None:
+        """Draw all triangles at once: software OpenGL takes longer to begin a part than to draw it."""
+        shapes = [mesh.shape for mesh in casting]
+        parts = [self._shapes.get(shape, lambda shape=shape: _casting(shape)) for shape in shapes]  # type: ignore[misc]
+        if [*map(id, shapes)] != [*map(id, self._thrown_shapes)]:
+            self._join(shapes, parts)
+        places = [
+            mesh.positions.take(rows, axis=0) @ mesh.matrix[:3, :3].T.astype(np.float32)
+            + mesh.matrix[:3, 3].astype(np.float32)
+            for mesh, (rows, _) in zip(casting, parts, strict=True)
+        ]
+        array, positions, _ = self._thrown_parts
+        write_buffer(positions, np.concatenate(places))
+        array.render(instances=INSTANCES)
+
+    def _join(self, shapes: list[FaceShape], parts: list[tuple[Intp, Int32]]) -> None:
+        """Make the buffers for the casting vertices of all shapes, one after the other."""
+        for part in self._thrown_parts:
+            part.release()
+        starts = np.cumsum([0, *(len(rows) for rows, _ in parts)])
+        joined = [triangles + start for (_, triangles), start in zip(parts, starts[:-1], strict=True)]
+        positions = self._gl.buffer(reserve=12 * max(int(starts[-1]), 1), dynamic=True)
+        triangles = make_buffer(self._gl, np.concatenate(joined), "i4")
+        attributes = [(positions, "3f", "in_position")]
+        array = self._gl.vertex_array(self._programs["thrown"], attributes, index_buffer=triangles)
+        self._thrown_parts, self._thrown_shapes = [array, positions, triangles], shapes
+
     def close(self) -> None:
         for part in (
-            *self._arrays.values(), *self._programs.values(), self._square, self._thrown, self._shaded,
-            self._heights, self._darkness,
+            *self._thrown_parts, *self._arrays.values(), *self._programs.values(), self._square, self._thrown,
+            self._shaded, self._heights, self._darkness,
         ):  # fmt: skip
             part.release()
 
 
+def _casting(shape: FaceShape) -> tuple[Intp, Int32]:
+    """Return the vertices (N,) of the triangles that cast a shape's shadow, and these triangles of them."""
+    rows, corners = np.unique(shape.triangles if shape.outer is None else shape.outer, return_inverse=True)
+    return rows.astype(np.intp), corners.reshape(-1, 3).astype(np.int32)
+
+
 def _casts(mesh: FaceMesh) -> bool:
-    return mesh.shape.casts and mesh.shape.kind not in INNER_KINDS and not mesh.turn.any()
+    shape = mesh.shape
+    drawn = shape.casts and shape.kind not in INNER_KINDS and len(shape.triangles) > 0
+    return drawn and not mesh.turn.any()
 
 
 def _ground_around(places: Float32) -> tuple[tuple[float, float], float]:

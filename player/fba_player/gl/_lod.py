@@ -21,8 +21,6 @@ MAX_FACE_ERROR_PIXELS = 0.8
 MORPH_SECONDS = 0.5
 """Seconds in which the vertices of a face move from one level of detail to another."""
 FULL = ("full", "0")
-SHADOW_ERROR = 0.0128
-"""Error (m) up to which bodies are simplified for their shadows on the ground."""
 SAMPLED_VERTICES = 24
 """Number of vertices from which the distance to the camera is taken."""
 
@@ -176,7 +174,7 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
         for array in (shape.texcoords, shape.wrinkle_places)
     )
     assert shape.coarser is not None
-    outer = shape.coarser.triangles_within(SHADOW_ERROR)
+    outer = shape.coarser.triangles_within(TOLERANCES[-1])  # for shadows on the ground
     if outer is not None:
         number = np.full(len(shape.sway), -1, dtype=np.int32)
         number[rows] = np.arange(len(rows))

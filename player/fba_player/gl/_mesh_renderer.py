@@ -74,22 +74,6 @@ class FaceRenderer:
             gl.fbo.depth_mask = True
             gl.enable_only(gl.DEPTH_TEST)
 
-    def draw_positions(self, meshes: list[FaceMesh], program: Any, instances: int) -> None:
-        """Draw the outer triangles of parts by a program of another renderer, which needs positions alone."""
-        for mesh in meshes:
-            if not len(mesh.shape.triangles):
-                continue
-            parts = self._shapes.get(mesh.shape, lambda mesh=mesh: self._upload(mesh))  # type: ignore[misc]
-            if program not in parts["arrays"]:
-                if mesh.shape.outer is not None:
-                    parts["outer"] = make_buffer(self._gl, mesh.shape.outer, "i4")
-                attributes = [(parts["positions"], "3f", "in_position")]
-                triangles = parts["outer"] or parts["triangles"]
-                parts["arrays"][program] = self._gl.vertex_array(program, attributes, index_buffer=triangles)
-            write_buffer(parts["positions"], mesh.positions)
-            set_uniform(program, "world", matrix_bytes(mesh.matrix))
-            parts["arrays"][program].render(instances=instances)
-
     def close(self) -> None:
         self._shapes.clear()
         for part in (*self._reliefs.values(), *self._wrinkles.values(), *self._programs.values()):
@@ -199,7 +183,6 @@ class FaceRenderer:
             "across": None if shape.across is None else make_buffer(gl, shape.across),
             "wrinkles": None if shape.wrinkle_places is None else make_buffer(gl, shape.wrinkle_places),
             "wrinkle_texel": texel,
-            "outer": None,
             "arrays": {},
             "pictures": Pictures(gl, shape, mesh.positions),
             "lit": None,
@@ -289,7 +272,7 @@ def _in_map(shape: FaceShape, positions: Float32) -> tuple[Float32, Float32, Int
 def _release(parts: dict[str, Any]) -> None:
     for array in parts["arrays"].values():
         array.release()
-    for name in ("positions", "normals", "light", "still", "triangles", "outer", "across", "wrinkles"):
+    for name in ("positions", "normals", "light", "still", "triangles", "across", "wrinkles"):
         if parts[name] is not None:
             parts[name].release()
     parts["pictures"].close()

@@ -198,7 +198,7 @@ class Renderer:
         blobs = np.ascontiguousarray(view.blobs[:MAX_BLOBS], dtype="f4")
         if not view.ground or not len(blobs):
             return
-        if self._ground_shadow.draw(self._faces, view.faces, view.blobs[:, :2], matrix_bytes(matrix)):
+        if self._ground_shadow.draw(view.faces, view.blobs[:, :2], matrix_bytes(matrix)):
             return
         gl.enable_only(gl.BLEND)
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE

@@ -9,7 +9,6 @@ import pytest
 
 from fba_player._mesh.primitives import sphere_mesh
 from fba_player.gl._ground_shadow import CELLS, GroundShadow, _ground_around
-from fba_player.gl._mesh_renderer import FaceRenderer
 from fba_player.view._view import FaceMesh, FaceShape
 
 KEY_SHARE, SKY_SHARE = 0.62, 0.85
@@ -42,9 +41,8 @@ class Ground:
     def __init__(self, context: Any, *meshes: FaceMesh) -> None:
         places = np.zeros((1, 2), dtype=np.float32)
         self.low, self.width = _ground_around(places)
-        renderer, shadow = FaceRenderer(context), GroundShadow(context)
-        self.darkness = shadow.darkness(renderer, list(meshes), places) / 255
-        renderer.close()
+        shadow = GroundShadow(context)
+        self.darkness = shadow.darkness(list(meshes), places) / 255
         shadow.close()
 
     def at(self, x: float, z: float) -> float:

@@ -67,7 +67,8 @@ void main() {
 #endif
     float cosine = dot(n, halfway.xyz);
     float nh2 = min(cosine * cosine / (dot(n, n) * dot(halfway.xyz, halfway.xyz)), 1.0);
-    vec3 shown = base + KEY * (shade.a * lobes(nh2, coordinates.w)) + AROUND * halfway.w;
+    vec2 left = unlost(albedo);
+    vec3 shown = base + KEY * (shade.a * left.x * lobes(nh2, coordinates.w)) + AROUND * (halfway.w * left.y);
 #else
     vec3 n = normalize(upright.xyz);
     vec3 view = normalize(eye - place);
@@ -79,9 +80,10 @@ void main() {
     n = normalize(n + grain * 0.45);
 #endif
     float cosine = dot(rough, normalize(view + KEY_DIRECTION));
+    vec2 left = unlost(albedo);
     vec3 shown = albedo * diffuse(n, albedo, light, scatter)
-        + KEY * (mirrored_key(view, n, light) * lobes(cosine * cosine, coordinates.w))
-        + AROUND * mirrored_around(view, n, colour.a, light);
+        + KEY * (mirrored_key(view, n, light) * left.x * lobes(cosine * cosine, coordinates.w))
+        + AROUND * (mirrored_around(view, n, colour.a, light) * left.y);
 #endif
     pixel = vec4(encode(shown), opaque);
 }

@@ -125,9 +125,10 @@ void main() {
     vec3 albedo = in_colour.rgb;
 #endif
     shade.rgb = in_colour.rgb * diffuse(n, albedo, reach, scatter);
-    shade.a = mirrored_key(view, n, reach);
+    vec2 left = unlost(in_colour.rgb);
+    shade.a = mirrored_key(view, n, reach) * left.x;
     halfway.xyz = normalize(view + KEY_DIRECTION);
-    halfway.w = mirrored_around(view, n, in_colour.a, reach);
+    halfway.w = mirrored_around(view, n, in_colour.a, reach) * left.y;
 #else
     place = stands.xyz;
     colour = in_colour;
