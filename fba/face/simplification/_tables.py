@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from fba.face.authoring.surface._motion import (
     unfold,
 )
 from fba.face.authoring.surface._motion_limits import stop_at_folds
-from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
+from fba.face.authoring.surface.landmarks import CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
 from fba.face.checks._fap_checks import CORNER_RADIUS, EYE_CORNERS, HAIR, TURNING, region_table
 from fba.face.model import FaceModel, Part
@@ -56,11 +57,16 @@ def _landmarks(model: FaceModel) -> Landmarks:
 
 
 def find_lines(model: FaceModel) -> Int32:
-    """Return (V,): a bit for each of `LINES` that a vertex is on."""
+    """Return (V,): a bit for each piece of `LINES`, from one feature point to the next, that a vertex is on."""
     marks = _landmarks(model)
-    lines = np.zeros(len(model.vertices), dtype=np.int32)
-    for bit, name in enumerate(LINES):
-        lines[marks.surface.pool[np.isin(marks.surface.number, marks.contour(name))]] |= 1 << bit
+    lines, bit = np.zeros(len(model.vertices), dtype=np.int32), 0
+    for name in LINES:
+        walk = marks.contour(name)
+        points = np.flatnonzero(np.isin(walk, marks.vertices_of(CONTOURS[name])))
+        for start, end in pairwise(points):
+            piece = walk[start : end + 1]
+            lines[marks.surface.pool[np.isin(marks.surface.number, piece)]] |= 1 << bit
+            bit += 1
     return lines
 
 
