@@ -319,7 +319,7 @@ def _kinds(triangles: Int32, wedges: Int32, count: int) -> Int32:
 def _measure_lines(places: Float64, triangles: Int32, lines: Int64) -> tuple[Int32, Int32, Float64]:
     """Return the ends of lines, their vertices and their lengths; see `_memoryless_loops.Surface`.
 
-    places: (V, 3). triangles: (F, 3). lines: (V,), a bit for each line. Without ends for what is no open line.
+    places: (V, 3). triangles: (F, 3). lines: (V,), a bit for each line. What is no open line has no ends.
     """
     count = int(lines.max(initial=0)).bit_length()
     ends, left, longest = np.full((count, 2), -1, np.int32), np.zeros(count, np.int32), np.zeros(count)
