@@ -142,6 +142,42 @@ def test_pinned_vertices_stay_where_they_are() -> None:
     np.testing.assert_allclose(level.carry(vertices)[level.parents[pinned]], vertices[pinned], atol=1e-12)
 
 
+def shortest_way(vertices: Float64, triangles: Int32, start: int, end: int) -> Int32:
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
+    one, other = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0).T
+    lengths = np.linalg.norm(vertices[one] - vertices[other], axis=1)
+    graph = csr_array((lengths, (one, other)), shape=(len(vertices), len(vertices)))
+    before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)[1]
+    way = [end]
+    while way[-1] != start:
+        way.append(int(before[way[-1]]))
+    return np.array(way, dtype=np.int32)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_lines_stay_the_shortest_way(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    vertices, triangles = patch(30)
+    vertices[:, 2] = random.uniform(0, 0.06, len(vertices))
+    ways = [shortest_way(vertices, triangles, start, end) for start, end in ((65, 830), (480, 500))]
+    lines, pinned = np.zeros(900, np.int32), np.zeros(900, bool)
+    for bit, way in enumerate(ways):
+        lines[way] |= 1 << bit
+        pinned[way[[0, -1]]] = True
+    made = simplify(vertices[None], triangles, 150, pinned=pinned, lines=lines)
+    assert len(made.level(150).triangles) == 150
+    for faces in (1200, 600, 400):
+        level = made.level(faces)
+        for way in ways:
+            ends = level.parents[way[[0, -1]]]
+            left = shortest_way(level.positions, level.triangles, int(ends[0]), int(ends[1]))
+            off = np.abs(level.positions[left][:, None] - vertices[way]).max(axis=2).min(axis=1)
+            assert not off.any()
+            assert 2 <= len(left) <= len(way)
+
+
 def test_a_seam_stays_closed_and_its_sides_keep_their_looks() -> None:
     """Two halves of a curved patch with a picture each: the vertices between them are there twice."""
     one, triangles = patch(17, 0.4)
@@ -223,7 +259,8 @@ def test_random_meshes_stay_meshes(seed: int) -> None:
         vertices[count // 2 :] = vertices[: count - count // 2]
     triangles = random.integers(0, count, (int(random.integers(1, 150)), 3))
     poses = np.stack([vertices, vertices + 0.1 * random.standard_normal((count, 3))])
-    made = simplify(poses, triangles, 1, looks=random.integers(0, 2, (count, 1)))
+    looks, lines = random.integers(0, 2, (count, 1)), random.integers(0, 8, count) * (seed % 2)
+    made = simplify(poses, triangles, 1, looks=looks, lines=lines)
     for step in range(len(made.faces) + 1):
         level = made.after(step)
         if len(level.triangles):

@@ -20,7 +20,7 @@ from fba.face.checks._fap_checks import count_errors
 from fba.face.checks._posing import Poser
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
-from fba.face.importers.assembly._repair import repair_tables
+from fba.face.importers.assembly._repair import repair_tables, take_sounder
 from fba.face.model import DetailLevel, FaceModel, shape_key
 from fba.face.simplification._tables import find_lines, fit_tables
 from fba.mesh.simplify import (
@@ -121,10 +121,24 @@ class FaceSimplification:
         face = replace(model, parts=parts, bound=bound.astype(np.int32), tables=(), levels=())
         if tables:
             fitted = fit_tables(model, face, level, self._unmoved(level), self.mesh.positions)
-            face = _mend(replace(face, tables=fitted))
+            face = self._mend(replace(face, tables=fitted), level)
         return DetailLevel(
             face, level.parents, max(self._errors(level, _root_mean_square)), shape_key(model.parts)
         )
+
+    def _mend(self, face: FaceModel, level: Level) -> FaceModel:
+        """Return the face with other tables for FAPs whose own break rules: carried, or from the mesh."""
+        poser, faps = Poser(face), [table.fap for table in face.tables]
+        if not count_errors(poser, faps):
+            return face
+        lids = tuple(table for table in self.model.tables if table.fap in LID_FAPS)
+        bare = replace(face, tables=())
+        model, still = self.model.with_tables(lids, {}), self._unmoved(level)
+        carried = fit_tables(model, bare, level, still, self.mesh.positions, carried=True)
+        plain = author(face.parts, face.points, bound=face.bound)
+        for other in (bare.with_tables(carried, {}), bare.with_tables(plain.tables, {})):
+            face = take_sounder(face, other)
+        return repair_tables(face, plain)
 
     @cached_property
     def _used(self) -> Bool:
@@ -166,14 +180,6 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         lines=lines,
     )
     return FaceSimplification(model, mesh, poses, kept | (lines > 0))
-
-
-def _mend(face: FaceModel) -> FaceModel:
-    """Return the face with sound tables for FAPs whose own break rules, from the mesh alone if need be."""
-    if not count_errors(Poser(face), [table.fap for table in face.tables]):
-        return face
-    plain = author(face.parts, face.points, bound=face.bound)
-    return repair_tables(face, plain)
 
 
 def level_sizes(model: FaceModel, count: int) -> list[int]:

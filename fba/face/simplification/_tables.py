@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from fba.face.authoring.surface._motion import (
     unfold,
 )
 from fba.face.authoring.surface._motion_limits import stop_at_folds
-from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
+from fba.face.authoring.surface.landmarks import CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
 from fba.face.checks._fap_checks import CORNER_RADIUS, EYE_CORNERS, HAIR, TURNING, region_table
 from fba.face.model import FaceModel, Part
@@ -45,7 +46,7 @@ LIFTS = 30
 """Rounds in which lids are lifted off the eyeball: lifting one triangle tilts its neighbours."""
 ROUNDS = 4
 """Rounds in which lids are lifted off the eyeball and folds taken out of them."""
-MOST_LIFT = 0.5
+MOST_LIFT = 1.0
 """Largest lift, as a share of the eyeball's radius."""
 SAMPLES = np.array([(0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3), *np.eye(3)])
 """Places on a triangle that are kept out of the eyeball, as weights of its corners."""
@@ -56,22 +57,33 @@ def _landmarks(model: FaceModel) -> Landmarks:
 
 
 def find_lines(model: FaceModel) -> Int32:
-    """Return (V,): a bit for each of `LINES` that a vertex is on."""
+    """Return (V,): a bit for each piece of `LINES`, between feature points, that a vertex is on."""
     marks = _landmarks(model)
-    lines = np.zeros(len(model.vertices), dtype=np.int32)
-    for bit, name in enumerate(LINES):
-        lines[marks.surface.pool[np.isin(marks.surface.number, marks.contour(name))]] |= 1 << bit
+    lines, bit = np.zeros(len(model.vertices), dtype=np.int32), 0
+    for name in LINES:
+        walk = marks.contour(name)
+        points = np.flatnonzero(np.isin(walk, marks.vertices_of(CONTOURS[name])))
+        for start, end in pairwise(points):
+            piece = walk[start : end + 1]
+            lines[marks.surface.pool[np.isin(marks.surface.number, piece)]] |= 1 << bit
+            bit += 1
     return lines
 
 
 def fit_tables(
-    model: FaceModel, face: FaceModel, level: Level, still: Int32, positions: Float64
+    model: FaceModel,
+    face: FaceModel,
+    level: Level,
+    still: Int32,
+    positions: Float64,
+    *,
+    carried: bool = False,
 ) -> tuple[FaceDefTables, ...]:
     """Return the tables with which a level moves most like the full face.
 
     model: the full face. face: that of the level, without tables. still: vertices of the full one that are
     still at their places; they move exactly as before, unless that turns a triangle over. positions: (N, 3),
-    of the full one.
+    of the full one. carried: whether each vertex moves as its place on the full face instead.
     """
     fit = _Fit(model, level, still, positions)
     easing = _Easing(face, fit)
@@ -79,7 +91,7 @@ def fit_tables(
     for table in model.tables:
         unit = face.fapu.of_fap(table.fap)
         meshes = [
-            easing.ease(table.fap, mesh, fit.motion(mesh, model.starts[mesh.part]), unit)
+            easing.ease(table.fap, mesh, fit.motion(mesh, model.starts[mesh.part], carried), unit)
             for mesh in table.meshes
         ]
         tables.append(replace(table, meshes=tuple(mesh for mesh in meshes if mesh is not None)))
@@ -116,15 +128,18 @@ class _Fit:
         self._beside = normal[self._free][:, self.fixed]
         self._solver = splu(normal[self._free][:, self._free].tocsc()) if len(self._free) else None
 
-    def motion(self, mesh: FaceDefMesh, start: int) -> Float64:
-        """Return (P, K - 1, 3) the displacements of a mesh whose part begins at the full face's `start`."""
+    def motion(self, mesh: FaceDefMesh, start: int, carried: bool) -> Float64:
+        """Return (P, K - 1, 3) the displacements of a mesh whose part begins at the full face's `start`.
+
+        carried: whether they are the interpolated ones.
+        """
         intervals = len(mesh.borders) - 1
         moves = np.zeros((self._total, 3 * intervals))
         moves[mesh.vertices + start] = mesh.displacements.reshape(-1, 3 * intervals)
         near = self._carried @ moves
-        fitted = np.zeros_like(near)
+        fitted = near.copy() if carried else np.zeros_like(near)
         fitted[self.fixed] = moves[self._still]
-        if self._solver is not None:
+        if self._solver is not None and not carried:
             right = self._spread.T @ moves + SMOOTHING * near
             fitted[self._free] = self._solver.solve(right[self._free] - self._beside @ fitted[self.fixed])
         fitted[~near.any(axis=1)] = 0.0  # what the full face does not move there

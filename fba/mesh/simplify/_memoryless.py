@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fba.arrays import Bool, Float64, Floating, Int32, Integer
+from fba.arrays import Bool, Float64, Floating, Int32, Int64, Integer
 from fba.errors import ModelError
 
 WELD = 1e-7
@@ -160,7 +160,7 @@ def simplify(
         kind[(through > 0) & (kind == loops.FREE)] = loops.ON_LINE
     surface = loops.Surface(
         welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
-        kind, np.zeros(total, np.int64), weight, through,
+        kind, np.zeros(total, np.int64), weight, through, *_measure_lines(welded[:, 0], whole, through),
     )  # fmt: skip
     number = int(wedges.max(initial=-1)) + 1
     history = loops.History(
@@ -171,11 +171,14 @@ def simplify(
     scratch = loops.Scratch(
         np.empty(2 * loops.MAX_RING, np.int32), np.empty(4 * loops.MAX_RING + 4, np.int32),
         np.empty((len(places), 13)), np.empty((3, 4)), np.empty(3), np.empty(1),
-        np.empty(loops.MAX_RING, np.int32), np.empty(loops.MAX_RING),
+        np.full(total, np.inf), np.zeros(total, np.int32),
     )  # fmt: skip
     done = 0
     if total:
         loops.link_corners(surface)
+        for line, (start, left) in enumerate(zip(surface.ends[:, 0], surface.left, strict=True)):
+            if start >= 0 and loops.leaves_line(surface, line, start, start, left, scratch):
+                surface.ends[line] = -1  # it is none to begin with
         for target in [faces] if isinstance(faces, int) else faces:
             left = int(history.faces[done - 1]) if done else len(whole)
             done = loops.collapse_edges(surface, history, done, left, max(int(target), 1), scratch)
@@ -311,6 +314,24 @@ def _kinds(triangles: Int32, wedges: Int32, count: int) -> Int32:
     kind[lines > 0] = loops.ON_LINE
     kind[(lines == 1) | (lines > 2) | crowded | (parts > 2) | ((lines == 0) & (parts > 1))] = loops.PINNED
     return kind
+
+
+def _measure_lines(places: Float64, triangles: Int32, lines: Int64) -> tuple[Int32, Int32, Float64]:
+    """Return the ends of lines, their vertices and their lengths; see `_memoryless_loops.Surface`.
+
+    places: (V, 3). triangles: (F, 3). lines: (V,), a bit for each line. What is no open line has no ends.
+    """
+    count = int(lines.max(initial=0)).bit_length()
+    ends, left, longest = np.full((count, 2), -1, np.int32), np.zeros(count, np.int32), np.zeros(count)
+    edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    for line in range(count):
+        on = (lines >> line & 1).astype(bool)
+        one, other = edges[on[edges].all(axis=1)].T
+        degree = np.bincount(np.concatenate([one, other]), minlength=len(lines))
+        left[line], longest[line] = on.sum(), np.linalg.norm(places[one] - places[other], axis=1).sum()
+        if len(one) == left[line] - 1 and (degree == 1).sum() == 2:
+            ends[line] = np.flatnonzero(degree == 1)
+    return ends, left, longest
 
 
 def _roots(onto: Int32, step: Int32, count: int) -> Int32:

@@ -30,6 +30,10 @@ MIN_TURN_COSINE = 0.2
 """No triangle may turn by more than the angle of this cosine, in any pose."""
 MIN_COMPACTNESS = 0.1
 """No triangle becomes less compact than this, 1 for an equilateral one, while others can go."""
+NEARLY = 1e-5
+"""Share by which a way beside a line must be longer: positions are rounded when a line is looked for."""
+MAX_ON_LINE = 1 << 30
+"""More vertices than a line has."""
 FREE, ON_LINE, PINNED = 0, 1, 2
 """Vertices that may move; those on a border or seam, which only collapse along it; those that stay."""
 
@@ -41,6 +45,8 @@ class Surface(NamedTuple):
     and wedges of each corner; the first corner is -1 once the triangle is gone. first, follow: (V,) and
     (3 F,), the corners of each vertex as a linked list. kind: (V,). version: (V,), counts changes nearby.
     importance: (V,), factors of the cost. lines: (V,), a bit for each line through a vertex that is kept.
+    ends: int32 (L, 2), the first and the last vertex of each line, -1 for a line that need not stay the
+    shortest way between them. left, longest: int32 and float64 (L,), vertices left, and the first length.
     """
 
     places: Float64
@@ -52,6 +58,9 @@ class Surface(NamedTuple):
     version: Int64
     importance: Float64
     lines: Int64
+    ends: Int32
+    left: Int32
+    longest: Float64
 
 
 class History(NamedTuple):
@@ -73,8 +82,8 @@ class History(NamedTuple):
 class Scratch(NamedTuple):
     """ring, near: int32, triangles and vertices around an edge. sums: (K, 13), of each pose: the quadratic as
     A (6), b (3), c, and the motion of one end relative to the other (3). planes: (3, 4), normals and right
-    sides. place: (3,), relative to one end. squared: (1,), the sum of the squared normals of the ring. ends,
-    ways: int32 and float64 (E,), vertices on lines nearby, and how far they are."""
+    sides. place: (3,), relative to one end. squared: (1,), the sum of the squared normals of the ring. reach,
+    steps: float64, infinite between uses, and int32 (V,), how far vertices are, by how many of a line."""
 
     ring: Int32
     near: Int32
@@ -82,8 +91,8 @@ class Scratch(NamedTuple):
     planes: Float64
     place: Float64
     squared: Float64
-    ends: Int32
-    ways: Float64
+    reach: Float64
+    steps: Int32
 
 
 @compiled
@@ -457,118 +466,68 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
 
 @compiled
 def _cuts_line(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
-    """Return whether a way beside a line would be shorter than the line when the edge from a to b collapses.
+    """Return whether the shortest way between a line's ends would leave it when the edge from a to b
+    collapses; only a way by the vertex that is left can be a new one."""
+    places, place, lines = surface.places, scratch.place, surface.lines
+    was, had = places[a, 0].copy(), lines[a]
+    for i in range(3):
+        places[a, 0, i] += place[i]
+    lines[a] |= lines[b]
+    cuts = False
+    for line in range(len(surface.ends)):
+        start, end = np.int64(surface.ends[line, 0]), np.int64(surface.ends[line, 1])
+        if start >= 0 and not cuts:
+            by = _distance(places[start, 0], places[a, 0]) + _distance(places[a, 0], places[end, 0])
+            both = had & lines[b] & (np.int64(1) << line)
+            wanted = surface.left[line] - (1 if both else 0)
+            cuts = by <= surface.longest[line] and leaves_line(surface, line, a, b, wanted, scratch)
+    places[a, 0], lines[a] = was, had
+    return cuts
 
-    Such a way is an edge between two of its vertices, or a few edges by the vertex that is left.
+
+@compiled
+def leaves_line(surface: Surface, line: int, a: int, b: int, wanted: int, scratch: Scratch) -> bool:
+    """Return whether the shortest way between a line's ends is not along its vertices, `wanted` in number.
+
+    b counts as a. Ways that are longer than the line has ever been are not followed (A*).
     """
-    lines, near, ends, ways = surface.lines, scratch.near, scratch.ends, scratch.ways
-    if lines[a] != lines[b]:
-        for one, other in ((a, b), (b, a)):
-            for i in range(_add_neighbours(surface, one, near, 0)):
-                v = near[i]
-                near_line = v != other and lines[v] & lines[other] & ~lines[one]
-                if near_line and not (_has_edge(surface, v, other) or _has_edge(surface, other, v)):
-                    return True
-    around = _add_neighbours(surface, b, near, _add_neighbours(surface, a, near, 0))
-    place, through, count = surface.places[a, 0] + scratch.place, lines[a] | lines[b], 0
-    if through:
-        ends[0], ways[0], count = a if lines[a] else b, 0.0, 1
-    for i in range(around):
-        v = np.int64(near[i])
-        if v not in (a, b):
-            way = _distance(surface.places[v, 0], place)
-            count = _add_ways(surface, v, way, 2 if through else 1, count, scratch)
-    for i in range(count):
-        for j in range(i):
-            v, w = np.int64(ends[i]), np.int64(ends[j])
-            shared = lines[v] & lines[w]
-            if v != w and shared and (j == 0 or not shared & through):
-                way = ways[i] + ways[j]
-                if way < 0.999999 * _line_length(surface, v, w, shared & -shared, way):
-                    return True
-    return False
-
-
-@compiled
-def _add_ways(surface: Surface, v: int, way: float, further: int, count: int, scratch: Scratch) -> int:
-    """Add the ways by v, which is a way off, to vertices on lines, over up to two more edges; return the
-    number of all."""
-    lines, places = surface.lines, surface.places
-    if lines[v]:
-        return _add_way(v, way, count, scratch)
-    c = surface.first[v]
-    while c >= 0:
-        for k in range(1, 3):
-            w = np.int64(surface.triangles[c // 3, (c % 3 + k) % 3])
-            if surface.triangles[c // 3, 0] >= 0:
-                to_w = way + _distance(places[v, 0], places[w, 0])
-                if lines[w]:
-                    count = _add_way(w, to_w, count, scratch)
-                elif further > 1:
-                    d = surface.first[w]
-                    while d >= 0:
-                        x = np.int64(surface.triangles[d // 3, (d % 3 + 1) % 3])
-                        if surface.triangles[d // 3, 0] >= 0 and lines[x]:
-                            to_x = to_w + _distance(places[w, 0], places[x, 0])
-                            count = _add_way(x, to_x, count, scratch)
-                        d = surface.follow[d]
-        c = surface.follow[c]
-    return count
-
-
-@compiled
-def _add_way(end: int, way: float, count: int, scratch: Scratch) -> int:
-    """Add a way to a vertex, unless a shorter one is known or there is no room; return the number of all."""
-    for i in range(count):
-        if scratch.ends[i] == end:
-            scratch.ways[i] = min(scratch.ways[i], way)
-            return count
-    if count < len(scratch.ends):
-        scratch.ends[count], scratch.ways[count] = end, way
-        count += 1
-    return count
+    places, reach, steps = surface.places, scratch.reach, scratch.steps
+    bit, most = np.int64(1) << line, surface.longest[line] * (1 + NEARLY)
+    start, end = np.int64(surface.ends[line, 0]), np.int64(surface.ends[line, 1])
+    start, end = a if start == b else start, a if end == b else end
+    reach[start], steps[start], steps[end] = 0.0, 1, 0
+    touched = [start]
+    heap = [(0.0, start)]
+    while len(heap) > 0:
+        way, v = heappop(heap)
+        if v == end:
+            break
+        if way > reach[v]:
+            continue
+        for side in range(2 if v == a else 1):
+            c = surface.first[v if side == 0 else b]
+            while c >= 0:
+                for k in range(1, 3):
+                    w = np.int64(surface.triangles[c // 3, (c % 3 + k) % 3])
+                    w = a if w == b else w
+                    if surface.triangles[c // 3, 0] >= 0 and w != v:
+                        along = surface.lines[v] & surface.lines[w] & bit
+                        step = _distance(places[v, 0], places[w, 0])
+                        to_w = way + (step if along else step * (1 - NEARLY))
+                        if to_w < reach[w] and to_w + _distance(places[w, 0], places[end, 0]) <= most:
+                            reach[w], steps[w] = to_w, steps[v] + 1 if along else -MAX_ON_LINE
+                            touched.append(w)
+                            heappush(heap, (to_w, w))
+                c = surface.follow[c]
+    for v in touched:
+        reach[v] = np.inf
+    return bool(steps[end] != wanted)
 
 
 @inlined
 def _distance(one: Float64, other: Float64) -> float:
     """Return the distance of two positions (3,)."""
     return float(np.sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2 + (one[2] - other[2]) ** 2))
-
-
-@compiled
-def _line_length(surface: Surface, start: int, end: int, line: int, most: float) -> float:
-    """Return the length at rest of a line between two of its vertices, or a length of at least `most`."""
-    longest = 0.0
-    for side in range(2):
-        length, before, v = 0.0, -1, start
-        while v >= 0 and v != end and length <= most:
-            w = _next_on_line(surface, v, before, line, side if before < 0 else 0)
-            if w >= 0:
-                length += _distance(surface.places[w, 0], surface.places[v, 0])
-            before, v = v, w
-        if v == end:
-            return length
-        if v >= 0:
-            longest = max(longest, length)
-    return longest
-
-
-@compiled
-def _next_on_line(surface: Surface, v: int, before: int, line: int, skipped: int) -> int:
-    """Return a neighbour of v on a line other than the one before, after so many others; -1 for none."""
-    first = -1
-    c = surface.first[v]
-    while c >= 0:
-        triangle = surface.triangles[c // 3]
-        if triangle[0] >= 0:
-            for k in range(3):
-                w = np.int64(triangle[k])
-                if w not in (v, before, first) and surface.lines[w] & line:
-                    if not skipped or first >= 0:
-                        return w
-                    first = w
-        c = surface.follow[c]
-    return -1
 
 
 @compiled
@@ -737,6 +696,12 @@ def _collapse(
     history.kept[step] = keep
     history.onto[gone] = keep
     history.step[gone] = step
+    for line in range(len(surface.ends)):
+        surface.left[line] -= surface.lines[keep] & surface.lines[gone] >> line & 1
+        for i in range(2):
+            if surface.ends[line, i] == gone:
+                surface.ends[line, i] = keep
+    surface.lines[keep] |= surface.lines[gone]
     last = -1
     c = surface.first[gone]
     while c >= 0:  # wedges on the two sides of the edge become one

@@ -65,6 +65,20 @@ def repair_tables(model: FaceModel, plain: FaceModel, *, note: tuple[str, str] =
     return repaired.with_notes({note[0]: note[1].format(names)})
 
 
+def take_sounder(model: FaceModel, other: FaceModel) -> FaceModel:
+    """Return the model with those tables of the same face with `other` ones that break fewer rules of
+    `check_faps`; both lids of an eye, which must meet, come from the same one."""
+    poser = Poser(model)
+    there, tables = Poser(other, like=poser), dict(model.table_of)
+    for fap in model.table_of:
+        together = _judged_with(fap)
+        if fap == together[0] and set(together) <= tables.keys() & other.table_of.keys():
+            errors = _count_errors(poser, fap)
+            if errors and _count_errors(there, fap) < errors:
+                tables |= {each: other.table_of[each] for each in together}
+    return model.with_tables(tuple(tables.values()), model.lost)
+
+
 def drop_false_pupils(model: FaceModel) -> FaceModel:
     """Return the model without the FAPs of pupils that the mesh of the eyeball does not have."""
     lost = dict(model.lost)
