@@ -7,42 +7,22 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from scipy.spatial import cKDTree
 
 import fba
 from fba.animation import Animation, BodyTrack
-from fba.arrays import Bool, Float32, Float64, Intp
-from fba.face import Deformer, resolve
-from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
-from fba.face.model import FaceModel
+from fba.arrays import Float32
+from fba.body import BodyModel
+from fba.face import Deformer, FaceModel, resolve
+from fba.parameters import BAP_COUNT, baps, point_rows
 from fba.parameters import faps as parameters
-from fba.parameters import point_rows
-from fba.player import Offscreen, Scene
-from fba_player._figure.face import FaceFigure, build_figure
-from player_tracks import face_track
+from fba.player import Offscreen
+from fba_player._figure.face import FaceFigure
+from tools.figure_checks import OPEN, SAMPLES, Checked, main, pierced
 
-OPEN = {
-    3: 500,
-    8: -50,
-    9: -50,
-    5: -600,
-    10: -500,
-    11: -500,
-    51: -50,
-    55: -50,
-    56: -50,
-    52: -600,
-    57: -500,
-    58: -500,
-}
-"""FAPs of jaw and lips: a mouth that is open."""
-SAMPLES = Path(fba.__file__).parent / "samples"
 SEEN = 12
 """Frames of a stream that are looked at."""
 TONGUE = (43, 44, 45, 46)
-BRIGHT = 3000.0
 
 
 def vector(values: dict[int, float]) -> Float32:
@@ -53,49 +33,13 @@ def vector(values: dict[int, float]) -> Float32:
 
 
 @pytest.fixture(scope="module")
-def marks() -> Landmarks:
-    model = FaceModel.default()
-    return find_landmarks(weld_skin(model.parts, model.bound), model.points, model.bound)
+def checked() -> Checked:
+    return Checked(FaceModel.default(), BodyModel.default())
 
 
 @pytest.fixture(scope="module")
-def figure() -> FaceFigure:
-    return build_figure(FaceModel.default())
-
-
-def of_model(marks: Landmarks, chosen: Bool) -> Bool:
-    """Return a mask of the model's vertices for one of the surface's."""
-    result = np.zeros(len(FaceModel.default().vertices), dtype=bool)
-    result[marks.surface.pool] = chosen[marks.surface.number]
-    return result
-
-
-def walls(marks: Landmarks) -> Bool:
-    """Return (V,): the inside of the mouth, without what is within two edges of the lips."""
-    inside = marks.inside_mouth.copy()
-    for _ in range(2):
-        edges = marks.surface.edges
-        beside = np.zeros_like(inside)
-        for a, b in (edges.T, edges[:, ::-1].T):
-            np.logical_or.at(beside, a, ~inside[b])
-        inside &= ~beside
-    return of_model(marks, inside)
-
-
-def person(faps: dict[int, float], bright: Bool | None = None) -> Scene:
-    """Return a person with these FAPs. bright: (V,) vertices of the face whose colour outshines all."""
-    count = 296
-    still = BodyTrack(np.zeros((1, count), np.int32), np.zeros((1, count), bool))
-    scene = Scene(Animation(25, np.arange(1), face_track([faps]), still))
-    shapes = scene.person.face_shapes
-    for name, shape in list(shapes.items()) if bright is not None else ():
-        assert bright is not None
-        rows = bright[scene.figure.rows(name)]
-        if rows.any():
-            colours = shape.colours.copy()
-            colours[rows, :3] = BRIGHT
-            shapes[name] = replace(shape, colours=colours)
-    return scene
+def figure(checked: Checked) -> FaceFigure:
+    return checked.figure
 
 
 @pytest.mark.usefixtures("opengl")
@@ -103,95 +47,21 @@ def person(faps: dict[int, float], bright: Bool | None = None) -> Scene:
 @pytest.mark.parametrize(
     "pose", [{}, {5: 60, 10: 60, 11: 60, 4: 60, 8: 60, 9: 60}, {6: 150, 7: 150, 12: 90, 13: 90}]
 )
-def test_closed_lips_show_nothing_of_the_mouth(marks: Landmarks, lines: int, pose: dict[int, float]) -> None:
+def test_closed_lips_show_nothing_of_the_mouth(checked: Checked, lines: int, pose: dict[int, float]) -> None:
     """Pictures of a whole person are equal, whatever colour walls of the mouth, teeth and tongue have."""
-    bright = walls(marks)
-    for part in FaceModel.default().parts:
-        if part.kind in ("teeth", "tongue"):
-            start = FaceModel.default().starts[part.name]
-            bright[start : start + len(part.vertices)] = True
-    plain, shining = person(pose), person(pose, bright)
-    size = (lines * 16 // 9, lines)
+    plain, shining = checked.person(), checked.person(bright=checked.mouth())
+    size, faps = (lines * 16 // 9, lines), vector(pose)
     camera = plain.camera("body", 16 / 9)
     with Offscreen(plain, size, camera) as one, Offscreen(shining, size, camera) as other:
         for yaw, pitch in ((0, 0), (25, 0), (-35, 15), (60, 0)):
             one.camera = other.camera = replace(camera, yaw=yaw, pitch=pitch)
-            np.testing.assert_array_equal(one.frame(0.0), other.frame(0.0))
+            np.testing.assert_array_equal(one.still(faps), other.still(faps))
 
 
 @pytest.mark.parametrize("split", [(1024, 0), (512, 512), (700, 324)])
-def test_lids_meet_along_their_whole_length(marks: Landmarks, split: tuple[int, int]) -> None:
+def test_lids_meet_along_their_whole_length(checked: Checked, split: tuple[int, int]) -> None:
     upper, lower = split
-    model = FaceModel.default()
-    moved = Deformer(model).local(vector({19: upper, 20: upper, 21: lower, 22: lower}))
-    places = np.empty((len(marks.surface), 3))
-    places[marks.surface.number] = moved[marks.surface.pool]
-    for side in ("left", "right"):
-        margins = [places[marks.contour(f"{side} {lid} lid")] for lid in ("upper", "lower")]
-        top, bottom = (sampled(line) for line in margins)
-        assert cKDTree(top).query(bottom)[0].max() < 0.0002
-        assert cKDTree(bottom).query(top)[0].max() < 0.0002
-
-
-def sampled(line: Float64) -> Float64:
-    """Return points along a line (N, 3), 20 on each of its pieces."""
-    steps = np.linspace(0, 1, 20, endpoint=False)[:, None, None]
-    return np.concatenate([(line[:-1] + steps * np.diff(line, axis=0)).reshape(-1, 3), line[-1:]])
-
-
-def outer_skin(marks: Landmarks) -> npt.NDArray[np.intp]:
-    """Return triangles (F, 3) of the face around the mouth, without lips and what is behind them."""
-    red = marks.lips | marks.on_inner_lips | marks.inside_mouth
-    red |= marks.on_contours("upper outer lip", "lower outer lip")
-    model = FaceModel.default()
-    start, skin = model.starts["skin"], model.part("skin")
-    triangles = skin.triangles.astype(np.intp) + start
-    low, high = model.points[point_rows()["2.1"]][1] - 0.01, model.points[point_rows()["9.3"]][1]
-    middle = model.vertices[triangles].mean(axis=1)
-    near = (
-        (middle[:, 1] > low) & (middle[:, 1] < high) & (middle[:, 2] > -0.05) & (np.abs(middle[:, 0]) < 0.06)
-    )
-    return np.asarray(triangles[near & ~of_model(marks, red)[triangles].any(axis=1)])
-
-
-def pierced(positions: Float32, edges: Intp, triangles: Intp) -> int:
-    """Return how many edges (E, 2) pass through triangles (F, 3)."""
-    start = positions[edges[:, 0]].astype(np.float64)
-    way = positions[edges[:, 1]] - start
-    corner = positions[triangles].astype(np.float64)
-    middle = corner.mean(axis=1)
-    reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
-    reach += np.linalg.norm(way, axis=1).max() / 2
-    near = cKDTree(start + way / 2).query_ball_point(middle, reach)
-    pairs = np.repeat(np.arange(len(triangles)), [len(those) for those in near])
-    edge = np.concatenate([np.asarray(those, dtype=np.intp) for those in near])
-    return int(_crossings(start[edge], way[edge], corner[pairs]).sum())
-
-
-def _crossings(start: Float64, way: Float64, corner: Float64) -> Bool:
-    """Return (N,) whether segments cross triangles (N, 3, 3), each its own, by Moeller and Trumbore."""
-    one, two = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    across = np.cross(way, two)
-    det = (across * one).sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        away = start - corner[:, 0]
-        u = (away * across).sum(axis=1) / det
-        turned = np.cross(away, one)
-        v = (way * turned).sum(axis=1) / det
-        t = (turned * two).sum(axis=1) / det
-        return np.asarray((u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1))
-
-
-def inner_edges(figure: FaceFigure) -> Intp:
-    """Return (E, 2): edges of tongue and teeth, vertices counted through the model."""
-    found = []
-    for part in figure.model.parts:
-        if part.kind in ("tongue", "teeth"):
-            corners = part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-            found.append(
-                np.unique(np.sort(corners, axis=1), axis=0).astype(np.intp) + figure.model.starts[part.name]
-            )
-    return np.concatenate(found)
+    assert checked.lid_gap(vector({19: upper, 20: upper, 21: lower, 22: lower})) < 0.0002
 
 
 def tongue_poses() -> Iterator[dict[int, float]]:
@@ -204,8 +74,8 @@ def tongue_poses() -> Iterator[dict[int, float]]:
 
 
 @pytest.mark.slow
-def test_the_tongue_pierces_no_skin(marks: Landmarks, figure: FaceFigure) -> None:
-    edges, skin = inner_edges(figure), outer_skin(marks)
+def test_the_tongue_pierces_no_skin(checked: Checked, figure: FaceFigure) -> None:
+    edges, skin = checked.inner_edges(), checked.outer_skin()
     for values in tongue_poses():
         assert pierced(figure.pose(vector(values)).positions, edges, skin) == 0, values
 
@@ -251,17 +121,17 @@ def test_lids_follow_the_gaze_unless_they_are_closed(figure: FaceFigure) -> None
 
 
 @pytest.mark.parametrize("number", [16, 17])
-def test_lips_pushed_back_stop_before_the_teeth(marks: Landmarks, figure: FaceFigure, number: int) -> None:
-    edges, skin = inner_edges(figure), outer_skin(marks)
+def test_lips_pushed_back_stop_before_the_teeth(checked: Checked, figure: FaceFigure, number: int) -> None:
+    edges, skin = checked.inner_edges(), checked.outer_skin()
     for value in (-1080, -450):
         assert pierced(figure.pose(vector({number: value})).positions, edges, skin) == 0, value
 
 
 @pytest.mark.parametrize("sample", ["hello.fap"])
 def test_frames_of_a_stream_keep_tongue_and_teeth_inside(
-    marks: Landmarks, figure: FaceFigure, sample: str
+    checked: Checked, figure: FaceFigure, sample: str
 ) -> None:
-    edges, skin = inner_edges(figure), outer_skin(marks)
+    edges, skin = checked.inner_edges(), checked.outer_skin()
     animation = fba.read(SAMPLES / sample)
     assert animation.face is not None
     frames = resolve(animation.face, figure.model)
@@ -270,11 +140,27 @@ def test_frames_of_a_stream_keep_tongue_and_teeth_inside(
 
 
 @pytest.mark.slow
-def test_faps_of_the_mouth_keep_tongue_and_teeth_inside(marks: Landmarks, figure: FaceFigure) -> None:
-    edges, skin = inner_edges(figure), outer_skin(marks)
+def test_faps_of_the_mouth_keep_tongue_and_teeth_inside(checked: Checked, figure: FaceFigure) -> None:
+    edges, skin = checked.inner_edges(), checked.outer_skin()
     for parameter in parameters()[2:]:
         if parameter.group not in (2, 8):
             continue
         for value in (-200, 200):
             positions = figure.pose(vector({parameter.number: value})).positions
             assert pierced(positions, edges, skin) == 0, (parameter.number, value)
+
+
+@pytest.mark.parametrize(("check", "code"), [("lids", 0), ("hands", 1)])
+def test_the_command_fails_where_it_finds_something(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], check: str, code: int
+) -> None:
+    """Arms that hang and turn inwards at the shoulder by 20 degrees go through the thighs."""
+    turned = {"l_shoulder_abduct": -35_000, "r_shoulder_abduct": 35_000}
+    values = np.zeros((1, BAP_COUNT), np.int32)
+    for bap in baps():
+        values[0, bap.number - 1] = turned.get(bap.name, 0)
+    assert values.any()
+    body = BodyTrack(values, np.ones((1, BAP_COUNT), bool))
+    fba.write(tmp_path / "inwards.bap", Animation(25, np.arange(1), None, body))
+    assert main(["--only", check, str(SAMPLES / "hello.fap"), str(tmp_path / "inwards.bap")]) == code
+    assert ("nothing found" in capsys.readouterr().out) == (code == 0)

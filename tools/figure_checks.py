@@ -1,0 +1,373 @@
+"""Checks that what closes on a figure is closed, and that what is inside stays inside, over real streams.
+
+python -m tools.figure_checks [--figure NAME] [--only mouth|lids|inside|hands]... [--frames 2000] [FILE...]
+
+mouth: pictures of the person, 360, 720 and 1080 lines high, show neither background nor the inside of the
+mouth between lips that a stream closes. lids: closed lids meet within 0.2 mm. inside: tongue and teeth pass
+through no skin, over all FAPs in steps, lips closed and open, and over frames of the streams. hands: are
+outside the thighs. Without files, the samples and the shared recordings (FBA_SHARED, else ../shared beside
+the checkout) are taken, for hands the samples. It prints each finding, and ends with 1 where there is one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain, product
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+import fba
+from fba import figures
+from fba.animation import Animation
+from fba.arrays import Bool, Float32, Float64, Intp
+from fba.body import BodyModel, GroundedPoser
+from fba.face import Deformer, FaceModel, resolve
+from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
+from fba.parameters import BAP_COUNT, FAP_COUNT, faps, point_rows
+from fba.player import Offscreen, Scene
+from fba.tracks import BodyTrack, FaceTrack
+from fba_player._figure.face import FaceFigure, build_figure
+from fba_player.playback._timeline import Timeline
+
+SAMPLES = Path(fba.__file__).parent / "samples"
+SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[2] / "shared")
+RECORDINGS = ("vectors/real/*.fba", "data/xface/*.fap", "data/vreng/*.?ap", "data/ist/*")
+LINES = (360, 720, 1080)
+VIEWS = ((0.0, 0.0), (25.0, 0.0), (-35.0, 15.0), (60.0, 0.0))
+"""Yaw and pitch of the camera, degrees."""
+FRONTAL = 30.0
+"""Up to this yaw, degrees, all that is behind the lips is face."""
+BRIGHT = 3000.0
+"""Colour that outshines all."""
+LIP_PAIRS = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
+CLOSED = 2e-5
+"""Gap of upper and lower lip, more than at rest, up to which lips are closed, metres."""
+TRIED = 60
+"""Frames of a stream among which one with closed lips is sought."""
+LIDS_MEET = 2e-4
+STEPS = 9
+"""Values tried of each FAP."""
+REACH = {2: 400, 3: 10**6, 4: 1080, 5: 400, 6: 1080, 7: 10**6, 8: 400, 9: 1080, 10: 1080}
+"""Largest value tried of a FAP, by group: as far as faces go."""
+OPEN = {
+    3: 500,
+    8: -50,
+    9: -50,
+    5: -600,
+    10: -500,
+    11: -500,
+    51: -50,
+    55: -50,
+    56: -50,
+    52: -600,
+    57: -500,
+    58: -500,
+}
+"""FAPs of jaw and lips: a mouth that is open."""
+HAND_DEPTH, THIGH_REACH = 0.001, 0.1
+"""Depth in a thigh that counts, and the distance from its skin within which it is known, metres."""
+
+HAND_FRAMES = 200
+"""Frames of a body that are looked at, at most."""
+Named = list[tuple[str, Float32]]
+"""Resolved FAPs (68,), each with a name."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A face that is checked. model: of a whole person; body: the same person's."""
+
+    model: FaceModel
+    body: BodyModel
+
+    @cached_property
+    def marks(self) -> Landmarks:
+        """Contours of its skin."""
+        return find_landmarks(
+            weld_skin(self.model.parts, self.model.bound), self.model.points, self.model.bound
+        )
+
+    @cached_property
+    def figure(self) -> FaceFigure:
+        """The face as it is shown."""
+        return build_figure(self.model)
+
+    def of_model(self, chosen: Bool) -> Bool:
+        """Return a mask of the model's vertices for one of the surface's."""
+        result = np.zeros(len(self.model.vertices), dtype=bool)
+        result[self.marks.surface.pool] = chosen[self.marks.surface.number]
+        return result
+
+    def walls(self) -> Bool:
+        """Return (V,): the inside of the mouth, without what is within two edges of the lips."""
+        inside, edges = self.marks.inside_mouth.copy(), self.marks.surface.edges
+        for _ in range(2):
+            beside = np.zeros_like(inside)
+            for a, b in (edges.T, edges[:, ::-1].T):
+                np.logical_or.at(beside, a, ~inside[b])
+            inside &= ~beside
+        return self.of_model(inside)
+
+    def mouth(self) -> Bool:
+        """Return (V,): walls of the mouth, teeth and tongue."""
+        chosen = self.walls()
+        for part in self.model.parts:
+            if part.kind in ("teeth", "tongue"):
+                start = self.model.starts[part.name]
+                chosen[start : start + len(part.vertices)] = True
+        return chosen
+
+    def outer_skin(self) -> Intp:
+        """Return triangles (F, 3) of the face around the mouth, without lips and what is behind them."""
+        marks, model = self.marks, self.model
+        red = marks.lips | marks.on_inner_lips | marks.inside_mouth
+        red |= marks.on_contours("upper outer lip", "lower outer lip")
+        triangles = model.part("skin").triangles.astype(np.intp) + model.starts["skin"]
+        low, high = model.points[point_rows()["2.1"]][1] - 0.01, model.points[point_rows()["9.3"]][1]
+        x, y, z = model.vertices[triangles].mean(axis=1).T
+        near = (y > low) & (y < high) & (z > -0.05) & (np.abs(x) < 0.06)
+        return np.asarray(triangles[near & ~self.of_model(red)[triangles].any(axis=1)])
+
+    def inner_edges(self) -> Intp:
+        """Return (E, 2): edges of tongue and teeth, vertices counted through the model."""
+        found = []
+        for part in self.model.parts:
+            if part.kind in ("tongue", "teeth"):
+                corners = np.sort(part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+                found.append(np.unique(corners, axis=0).astype(np.intp) + self.model.starts[part.name])
+        return np.concatenate(found)
+
+    def person(self, frames: int = 1, bright: Bool | None = None) -> Scene:
+        """Return the person at rest. bright: (V,) vertices of the face whose colour outshines all."""
+        still = BodyTrack(np.zeros((frames, BAP_COUNT), np.int32), np.zeros((frames, BAP_COUNT), bool))
+        face = FaceTrack(np.zeros((frames, FAP_COUNT), np.int32), np.zeros((frames, FAP_COUNT), bool))
+        scene = Scene(Animation(25, np.arange(frames), face, still), self.model, body=self.body)
+        shapes = scene.person.face_shapes
+        for name, shape in list(shapes.items()) if bright is not None else ():
+            assert bright is not None
+            if (rows := bright[scene.figure.rows(name)]).any():
+                colours = shape.colours.copy()
+                colours[rows, :3] = BRIGHT
+                shapes[name] = replace(shape, colours=colours)
+        return scene
+
+    def lid_gap(self, values: Float32) -> float:
+        """Return the largest distance, metres, of a place on one lid's edge from the other lid's."""
+        marks, moved = self.marks, Deformer(self.model).local(values)
+        places = np.empty((len(marks.surface), 3))
+        places[marks.surface.number] = moved[marks.surface.pool]
+        gap = 0.0
+        for side in ("left", "right"):
+            top, bottom = (_sampled(places[marks.contour(f"{side} {lid} lid")]) for lid in ("upper", "lower"))
+            gap = max(gap, *(float(cKDTree(a).query(b)[0].max()) for a, b in ((top, bottom), (bottom, top))))
+        return gap
+
+    def closed_frame(self, frames: Float32) -> Float32 | None:
+        """Return that of frames (T, 68) of resolved FAPs with closed lips that is furthest from rest."""
+        points = self.figure.deformer.feature_points(
+            np.concatenate([np.zeros_like(frames[:1]), frames]), local=True
+        )
+        pairs = [points[:, [point_rows()[up], point_rows()[low]], 1] for up, low in LIP_PAIRS]
+        gaps = np.stack([pair[:, 0] - pair[:, 1] for pair in pairs], axis=1)
+        closed = np.flatnonzero(((gaps[1:] - gaps[0]) < CLOSED).all(axis=1))
+        if not len(closed):
+            return None
+        lips = [fap.number - 1 for fap in faps()[2:] if fap.group in (2, 8)]
+        return frames[closed[np.abs(frames[closed][:, lips]).sum(axis=1).argmax()]]
+
+    def mouth_line(self, scene: Scene, values: Float32, clip: Float64, size: tuple[int, int]) -> Bool:
+        """Return a mask (H, W) of a picture's pixels on the line between closed lips. clip: the camera's."""
+        pose, surface = self.figure.pose(values), self.marks.surface
+        places = np.empty((len(surface), 3))
+        places[surface.number] = pose.positions[surface.pool]
+        line = _sampled(places[self.marks.contour("upper inner lip")])
+        _, joints = scene._pose_at(0.0)
+        world = scene._face_matrix(joints) @ pose.turn
+        x, y, _, w = clip @ world @ np.c_[line, np.ones(len(line))].T
+        mask = np.zeros(size[::-1], dtype=bool)
+        mask[((1 - y / w) / 2 * size[1]).astype(int), ((x / w + 1) / 2 * size[0]).astype(int)] = True
+        return mask
+
+
+def pierced(positions: Float32, edges: Intp, triangles: Intp) -> int:
+    """Return how many edges (E, 2) pass through triangles (F, 3)."""
+    start = positions[edges[:, 0]].astype(np.float64)
+    way = positions[edges[:, 1]] - start
+    corner = positions[triangles].astype(np.float64)
+    middle = corner.mean(axis=1)
+    reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
+    reach += np.linalg.norm(way, axis=1).max() / 2
+    near = cKDTree(start + way / 2).query_ball_point(middle, reach)
+    pairs = np.repeat(np.arange(len(triangles)), [len(those) for those in near])
+    edge = np.concatenate([np.asarray(those, dtype=np.intp) for those in near])
+    return int(_crossings(start[edge], way[edge], corner[pairs]).sum())
+
+
+def _crossings(start: Float64, way: Float64, corner: Float64) -> Bool:
+    """Return (N,) whether segments cross triangles (N, 3, 3), each its own, by Moeller and Trumbore."""
+    one, two = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    across = np.cross(way, two)
+    det = (across * one).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = start - corner[:, 0]
+        u = (away * across).sum(axis=1) / det
+        turned = np.cross(away, one)
+        v = (way * turned).sum(axis=1) / det
+        t = (turned * two).sum(axis=1) / det
+        return np.asarray((u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1))
+
+
+def _sampled(line: Float64) -> Float64:
+    """Return points along a line (N, 3), 20 on each of its pieces."""
+    steps = np.linspace(0, 1, 20, endpoint=False)[:, None, None]
+    return np.concatenate([(line[:-1] + steps * np.diff(line, axis=0)).reshape(-1, 3), line[-1:]])
+
+
+def check_mouth(checked: Checked, frames: Named) -> Iterator[str]:
+    """Yield where pictures of closed lips, resolved FAPs (68,) by name, show background or the mouth."""
+    plain, shining, grey = checked.person(), checked.person(bright=checked.mouth()), checked.person()
+    grey.show("background", "grey")
+    camera = plain.camera("body", 16 / 9)
+    for lines in LINES:
+        size = (lines * 16 // 9, lines)
+        with Offscreen(plain, size) as one, Offscreen(shining, size) as two, Offscreen(grey, size) as three:
+            for (name, values), (yaw, pitch) in product(frames, VIEWS):
+                one.camera = two.camera = three.camera = replace(camera, yaw=yaw, pitch=pitch)
+                picture = one.still(values)
+                seen = int((picture != two.still(values)).any(axis=2).sum())
+                if abs(yaw) < FRONTAL:
+                    line = checked.mouth_line(plain, values, one.camera.clip_matrix(size), size)
+                    seen += int((picture[line] != three.still(values)[line]).any(axis=1).sum())
+                if seen:
+                    yield f"{name} at {lines} lines, yaw {yaw:g}: {seen} pixels behind closed lips"
+
+
+def check_lids(checked: Checked) -> Iterator[str]:
+    """Yield how closed lids fail to meet."""
+    for upper in range(512, 1025, 128):
+        values = np.zeros(FAP_COUNT, np.float32)
+        values[18:20], values[20:22] = upper, 1024 - upper
+        if (gap := checked.lid_gap(values)) >= LIDS_MEET:
+            yield f"upper lids {upper}, lower {1024 - upper}: {gap * 1000:.2f} mm apart"
+
+
+def fap_steps() -> Iterator[tuple[str, Float32]]:
+    """Yield each low-level FAP in steps within its range, lips closed and open, with its name."""
+    for fap in faps()[2:]:
+        low, high = np.clip(fap.i_limits, -REACH[fap.group], REACH[fap.group])
+        for opened, value in product((False, True), np.unique(np.linspace(low, high, STEPS).astype(int))):
+            values = np.zeros(FAP_COUNT, np.float32)
+            for number, open_value in OPEN.items() if opened else ():
+                values[number - 1] = open_value
+            values[fap.number - 1] = value
+            yield f"{fap.name}={value}{' with the mouth open' if opened else ''}", values
+
+
+def check_inside(checked: Checked, poses: Iterable[tuple[str, Float32]]) -> Iterator[str]:
+    """Yield poses, named resolved FAPs (68,), at which tongue or teeth pass through the skin."""
+    edges, skin = checked.inner_edges(), checked.outer_skin()
+    for name, values in poses:
+        if count := pierced(checked.figure.pose(values).positions, edges, skin):
+            yield f"{name}: {count} edges of tongue and teeth pass through the skin"
+
+
+def hand_depths(body: BodyModel, joints: Float64) -> tuple[float, int]:
+    """Return how deep hands are in thighs, metres, and how many vertices of hands, for joints (J, 4, 4).
+
+    The depth is that below the plane through the nearest vertex of a thigh.
+    """
+    names, owner = body.skeleton.names, body.joints[np.arange(len(body.joints)), body.weights.argmax(axis=1)]
+    positions, normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
+    body.skin(joints, positions, normals)
+    wrists = [body.skeleton.descendants(names.index(f"{side}_wrist")) for side in "lr"]
+    hands = positions[np.isin(owner, np.concatenate(wrists))]
+    thighs = np.isin(owner, [names.index("l_hip"), names.index("r_hip")])
+    away, nearest = cKDTree(positions[thighs]).query(hands, distance_upper_bound=THIGH_REACH)
+    at, near = nearest[np.isfinite(away)], hands[np.isfinite(away)]
+    depth = -((near - positions[thighs][at]) * normals[thighs][at]).sum(axis=1)
+    return float(depth.max(initial=0.0)), int((depth > HAND_DEPTH).sum())
+
+
+def check_hands(body: BodyModel, animations: dict[str, Animation]) -> Iterator[str]:
+    """Yield the animations whose hands are in the thighs, with the worst frame."""
+    poser = GroundedPoser(body.skeleton)
+    for name, animation in animations.items():
+        frames = np.unique(np.linspace(0, len(animation) - 1, HAND_FRAMES).astype(int))
+        _, baps = Timeline(animation).many([float(animation.index[k] / animation.rate) for k in frames])
+        depths, counts = np.array([hand_depths(body, poser.pose(row)) for row in baps]).T
+        if counts.any():
+            worst = frames[depths.argmax()]
+            yield f"{name}: hands in thighs in {(counts > 0).sum()} of {len(frames)} frames, by up to " + (
+                f"{depths.max() * 1000:.0f} mm in frame {worst}"
+            )
+
+
+def choose_frames(checked: Checked, faces: dict[str, Float32], count: int) -> tuple[Named, Named]:
+    """Return a closed frame of each stream that has one, and frames of all of them, the same each time."""
+    random, closed, pool = np.random.default_rng(30), Named(), Named()
+    for name, frames in faces.items():
+        tried = frames[np.sort(random.choice(len(frames), min(TRIED, len(frames)), replace=False))]
+        if (found := checked.closed_frame(tried)) is not None:
+            closed.append((name, found))
+        pool += [(f"{name} frame {number}", frame) for number, frame in enumerate(frames)]
+    chosen = np.sort(random.choice(len(pool), min(count, len(pool)), replace=False))
+    return closed, [pool[number] for number in chosen]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the checks that the command line asks for; return 1 if one failed."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.figure_checks",
+        description=__doc__,
+        formatter_class=argparse.RawTextHelpFormatter,
+    )
+    parser.add_argument("files", nargs="*", type=Path)
+    parser.add_argument("--figure", default="alex", choices=list(figures.FIGURES))
+    parser.add_argument("--only", action="append", choices=["mouth", "lids", "inside", "hands"])
+    parser.add_argument("--frames", type=int, default=2000, help="frames of streams for the check `inside`")
+    given = parser.parse_args(arguments)
+    files = given.files or [
+        SAMPLES / "hello.fap",
+        SAMPLES / "hello.bvh",
+        *(path for pattern in RECORDINGS for path in sorted(SHARED.glob(pattern))),
+    ]
+    streams = {path.name: fba.read(path) for path in files}
+    checked = Checked(figures.face(given.figure), figures.body(given.figure))
+    faces = {
+        name: resolve(one.face, checked.model).astype(np.float32)
+        for name, one in streams.items()
+        if one.face is not None
+    }
+    closed, frames = choose_frames(checked, faces, given.frames)
+    bodies = {
+        path.name: streams[path.name]
+        for path in files
+        if streams[path.name].body is not None and (given.files or path.parent == SAMPLES)
+    }
+    checks = {
+        "mouth": (f"{len(closed)} streams", check_mouth(checked, closed)),
+        "lids": ("closed in 5 ways", check_lids(checked)),
+        "inside": (f"all FAPs and {len(frames)} frames", check_inside(checked, chain(fap_steps(), frames))),
+        "hands": (f"{len(bodies)} bodies", check_hands(checked.body, bodies)),
+    }
+    failed = False
+    for name, (what, findings) in checks.items():
+        if not given.only or name in given.only:
+            found = 0
+            for finding in findings:
+                print(f"  {finding}", flush=True)
+                found += 1
+            print(f"{name} ({what}): {f'{found} findings' if found else 'nothing found'}", flush=True)
+            failed |= found > 0
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
