@@ -30,6 +30,7 @@ from fba.arrays import Bool, Float32, Float64, Intp
 from fba.body import BodyModel, GroundedPoser
 from fba.face import Deformer, FaceModel, resolve
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
+from fba.face.macros import open_mouth
 from fba.parameters import BAP_COUNT, FAP_COUNT, faps, point_rows
 from fba.player import Offscreen, Scene
 from fba.tracks import BodyTrack, FaceTrack
@@ -56,21 +57,6 @@ STEPS = 9
 """Values tried of each FAP."""
 REACH = {2: 400, 3: 10**6, 4: 1080, 5: 400, 6: 1080, 7: 10**6, 8: 400, 9: 1080, 10: 1080}
 """Largest value tried of a FAP, by group: as far as faces go."""
-OPEN = {
-    3: 500,
-    8: -50,
-    9: -50,
-    5: -600,
-    10: -500,
-    11: -500,
-    51: -50,
-    55: -50,
-    56: -50,
-    52: -600,
-    57: -500,
-    58: -500,
-}
-"""FAPs of jaw and lips: a mouth that is open."""
 HAND_DEPTH, THIGH_REACH = 0.001, 0.1
 """Depth in a thigh that counts, and the distance from its skin within which it is known, metres."""
 
@@ -263,9 +249,7 @@ def fap_steps() -> Iterator[tuple[str, Float32]]:
     for fap in faps()[2:]:
         low, high = np.clip(fap.i_limits, -REACH[fap.group], REACH[fap.group])
         for opened, value in product((False, True), np.unique(np.linspace(low, high, STEPS).astype(int))):
-            values = np.zeros(FAP_COUNT, np.float32)
-            for number, open_value in OPEN.items() if opened else ():
-                values[number - 1] = open_value
+            values = open_mouth(100 * opened)
             values[fap.number - 1] = value
             yield f"{fap.name}={value}{' with the mouth open' if opened else ''}", values
 

@@ -44,11 +44,19 @@ class Pose:
         help="Without a file: an expression, 0..63; up to two.",
     )
 
+    open_mouth: int | None = option(
+        "--open-mouth",
+        type=click.IntRange(0, 100),
+        metavar="PERCENT",
+        help="Without a file: opens the mouth, jaw and lips together; what --fap gives overrides it.",
+    )
+
     @property
     def given(self) -> list[str]:
         """The options that were used."""
         used = {"--fap": self.faps, "--viseme": self.visemes, "--expression": self.expressions}
-        return [option for option, values in used.items() if values]
+        opened = ["--open-mouth"] if self.open_mouth is not None else []
+        return [option for option, values in used.items() if values] + opened
 
 
 def still_animation(pose: Pose) -> Animation:
@@ -69,6 +77,12 @@ def still_animation(pose: Pose) -> Animation:
         if mask[0, number - 1]:
             raise click.UsageError(f"--fap {text}: FAP {number} is given twice")
         values[0, number - 1], mask[0, number - 1] = value, True
+    if pose.open_mouth is not None:
+        from fba.face.macros import open_mouth
+
+        opened = np.rint(open_mouth(pose.open_mouth)).astype(np.int32)
+        np.copyto(values[0], opened, where=~mask[0])
+        mask[0] |= opened != 0
     viseme, expression = np.zeros((1, 4), dtype=np.int16), np.zeros((1, 6), dtype=np.int16)
     if pose.visemes:
         pairs = _parse_selects("viseme", pose.visemes)

@@ -103,6 +103,7 @@ def test_mistakes_are_explained(given: tuple[tuple[str, ...], ...], text: str) -
     [
         ((), "give a file, or a face"),
         (("--fap", "3=1", "--frame", "2"), "--frame goes with a file"),
+        (("--open-mouth", "50", "--frame", "2"), "--frame goes with a file"),
         (("--contact-sheet", "faps", "--fap", "3=1"), "poses and cameras of its own"),
         (("--contact-sheet", "eyebrows"), "'faps', 'visemes', 'expressions', 'all'"),
         (("--contact-sheet", "faps", "--size", "8x8"), "at least 16x16"),
@@ -133,12 +134,18 @@ def test_a_face_is_drawn_as_asked(run: Run, tmp_path: Path) -> None:
         "posed": ("--fap", "open_jaw=800", "--viseme", "4", "--expression", "joy=50"),
         "again": ("--fap", "open_jaw=800", "--viseme", "4", "--expression", "joy=50"),
         "aside": ("--fap", "3=0", "--camera", "profile"),
+        "shut": ("--open-mouth", "0"),
+        "open": ("--open-mouth", "100"),
+        "held": ("--open-mouth", "100", "--fap", "open_jaw=0"),
     }.items():
         path = tmp_path / f"{name}.png"
         assert run("render", *arguments, "-o", path, *SMALL) == (0, f"{path}: 96x72\n", "")
         found[name] = pixels(path)
     assert found["neutral"].shape == (72, 96, 3)
     np.testing.assert_array_equal(found["posed"], found["again"])
+    np.testing.assert_array_equal(found["shut"], found["neutral"])
+    assert (found["open"] != found["shut"]).any()
+    assert (found["held"] != found["open"]).any()
     changed = np.abs(found["posed"] - found["neutral"]).max(axis=2) > 10
     assert changed.any()
     assert changed[36:].sum() > 0.7 * changed.sum()  # the mouth is in the lower half, the brows are not

@@ -8,6 +8,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba.face import Definitions
+from fba.face.macros import open_mouth
 from fba.parameters import (
     BAP_COUNT,
     EXPRESSION_SELECT_MAX,
@@ -50,9 +51,9 @@ class Puppet:
     """Values set by the user over those that are played; a hook for `Session.before_frame`.
 
     A FAP or BAP that was moved has that value until it is released; all others have the value that is played.
-    A viseme replaces all FAPs that visemes move; an expression is added to what is played, as with init_face
-    of the standard. A mood moves the rest shape, and all of this is added to it. FAPs moved by hand replace
-    all.
+    A viseme replaces all FAPs that visemes move; an opening of the mouth, 0 to 100, and an expression are
+    added to what is played, as with init_face of the standard. A mood moves the rest shape, and all of this
+    is added to it. FAPs moved by hand replace all.
 
     mood: see `PuppetMood`. definitions: of visemes and expressions, by default the built-in ones. motion:
     FAPs (68,) and BAPs (296,) of the last picture before they were changed; shown: the same afterwards.
@@ -64,6 +65,7 @@ class Puppet:
         self._fap_values = np.zeros(FAP_COUNT, np.float32)
         self._bap_values = np.zeros(BAP_COUNT)
         self.mood = PuppetMood()
+        self.mouth_opening = 0
         self.fap_moved = np.zeros(FAP_COUNT, bool)
         self.bap_moved = np.zeros(BAP_COUNT, bool)
         self._viseme, self._expression = Viseme(), Expression()
@@ -79,6 +81,8 @@ class Puppet:
             np.copyto(faps, self._spoken, where=self._mouth)
         if self.feels:
             faps += self._felt
+        if self.mouth_opening:
+            faps += open_mouth(self.mouth_opening)
         self.mood.apply(faps)
         np.copyto(faps, self._fap_values, where=self.fap_moved)
         np.copyto(baps, self._bap_values, where=self.bap_moved)
@@ -88,7 +92,7 @@ class Puppet:
     def idle(self) -> bool:
         """Whether it changes nothing."""
         moved = self.fap_moved.any() or self.bap_moved.any()
-        return not (self.speaks or self.feels or self.mood.active or moved)
+        return not (self.speaks or self.feels or self.mouth_opening or self.mood.active or moved)
 
     @property
     def speaks(self) -> bool:
@@ -151,7 +155,8 @@ class Puppet:
                 moved[number - 1] = False
 
     def release_all(self) -> None:
-        """Release everything, including visemes, expressions and the mood."""
+        """Release everything, including visemes, expressions, the opening of the mouth and the mood."""
+        self.mouth_opening = 0
         self.mood.release()
         self.fap_moved[:] = False
         self.bap_moved[:] = False

@@ -14,14 +14,16 @@ from fba.animation import Animation, BodyTrack
 from fba.arrays import Float32
 from fba.body import BodyModel
 from fba.face import Deformer, FaceModel, resolve
+from fba.face.macros import open_mouth
 from fba.parameters import BAP_COUNT, baps, point_rows
 from fba.parameters import faps as parameters
 from fba.player import Offscreen
 from fba_player._figure.face import FaceFigure
-from tools.figure_checks import OPEN, SAMPLES, Checked, main, pierced
+from tools.figure_checks import SAMPLES, Checked, main, pierced
 
 SEEN = 12
 """Frames of a stream that are looked at."""
+OPEN = {number: float(value) for number, value in enumerate(open_mouth(100), 1) if value}
 TONGUE = (43, 44, 45, 46)
 
 

@@ -257,3 +257,14 @@ def test_a_take_ends_after_an_hour() -> None:
     assert len(recorder) == 3600 * 5 + 1
     ramp(recorder, np.array([1e9]))
     assert len(recorder) == 3600 * 5 + 1
+
+
+def test_the_mouth_opens_jaw_and_lips_over_what_is_played() -> None:
+    puppet = Puppet()
+    puppet.mouth_opening = 50
+    faps, baps = played()
+    puppet(faps, baps)
+    assert not puppet.idle
+    assert (faps[2], faps[4], faps[51], faps[18]) == (1003 + 250, 1005 - 300, 1052 - 300, 1019)
+    puppet.release_all()
+    assert puppet.idle

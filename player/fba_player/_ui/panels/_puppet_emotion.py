@@ -202,6 +202,12 @@ def draw_visemes(performer: Performer) -> None:
         puppet.viseme = Viseme()
 
 
+def draw_mouth(performer: Performer) -> None:
+    """Draw the slider that opens the mouth, jaw with lips."""
+    heading("Mouth")
+    performer.puppet.mouth_opening = _slider("open", performer.puppet.mouth_opening, 100)
+
+
 def draw_expressions(performer: Performer) -> None:
     """Draw the choice of two expressions and their intensities."""
     heading("Expressions")
@@ -231,10 +237,10 @@ def _release(what: str, *, enabled: bool) -> bool:
     return bool(pressed and enabled)
 
 
-def _slider(label: str, now: int) -> int:
+def _slider(label: str, now: int, most: int = INTENSITY_MAX) -> int:
     """Draw a slider from 0 to the largest intensity; return its value."""
     imgui.set_next_item_width(-100)
-    return int(imgui.slider_int(label, now, 0, INTENSITY_MAX, "%d", imgui.SliderFlags_.always_clamp)[1])
+    return int(imgui.slider_int(label, now, 0, most, "%d", imgui.SliderFlags_.always_clamp)[1])
 
 
 def _choice(label: str, names: tuple[str, ...], now: int) -> int:

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from fba.errors import FbaError
 from fba_player._ui import theme
 from fba_player._ui.panels._curve_data import parameter
-from fba_player._ui.panels._puppet_emotion import EmotionTab, draw_expressions, draw_visemes
+from fba_player._ui.panels._puppet_emotion import EmotionTab, draw_expressions, draw_mouth, draw_visemes
 from fba_player._ui.panels._puppet_rows import Group, Row, groups
 from fba_player._ui.panels.panel import Panel, shorten, tooltip
 from fba_player.scene.scene import Scene
@@ -85,6 +85,7 @@ class PuppetPanel(Panel):
                     imgui.push_style_var(imgui.StyleVar_.item_spacing, (8, 4))
                     imgui.begin_child("rows", (0, 0))
                     if kind == "speech":
+                        draw_mouth(performer)
                         draw_visemes(performer)
                         draw_expressions(performer)
                     elif kind == "mood":
