@@ -200,5 +200,5 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     upward = around // 4
     side = int(np.abs(t - 0.64).argmin()) * around
     points = {"6.1": point, "6.2": body * around + upward, "6.3": side, "6.4": side + around // 2}
-    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.5)])
+    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.1)])
     return mesh, points

@@ -16,7 +16,7 @@ from fba_player.view._view import FaceMesh, FaceShape
 
 MAX_ERROR_PIXELS = 1.3
 """Largest error of a coarser mesh of a body, in pixels."""
-MAX_FACE_ERROR_PIXELS = 0.8
+MAX_FACE_ERROR_PIXELS = 0.3
 """Largest root-mean-square error of a face's level of detail, in pixels."""
 MORPH_SECONDS = 0.5
 """Seconds in which the vertices of a face move from one level of detail to another."""
