@@ -120,8 +120,8 @@ class _Fit:
         first = np.unique(self.point, return_index=True)[1]  # one side of each seam
         self.places = level.positions[first]
         down = np.repeat(np.arange(count), 3)
-        where = (down, level.rows[first].ravel())
-        self._carried = coo_array((level.weights[first].ravel(), where), shape=(count, self._total)).tocsr()
+        beside = (down, level.rows[first].ravel())
+        self._carried = coo_array((level.weights[first].ravel(), beside), shape=(count, self._total)).tocsr()
         self._still, self.fixed = still, self.point[level.parents[still]]
         self._free = np.setdiff1d(np.arange(count), self.fixed)
         normal = (self._spread.T @ self._spread + SMOOTHING * eye_array(count)).tocsr()

@@ -263,7 +263,7 @@ def _on_triangles(points: Floating, corners: Floating) -> tuple[Float64, Float64
     return shares, np.einsum("ij,ij->i", off, off)
 
 
-def _per_vertex(values: Floating | Bool, count: int, what: str) -> Float64:
+def _per_vertex(values: Floating | Integer | Bool, count: int, what: str) -> Float64:
     array = np.asarray(values, dtype=np.float64)
     if array.shape != (count,) or not np.isfinite(array).all() or (array < 0).any():
         raise ModelError(f"{what} must be {count} numbers that are not negative, one for each vertex")

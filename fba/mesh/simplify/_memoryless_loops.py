@@ -493,7 +493,8 @@ def leaves_line(surface: Surface, line: int, a: int, b: int, wanted: int, scratc
     """
     places, reach, steps = surface.places, scratch.reach, scratch.steps
     bit, most = np.int64(1) << line, surface.longest[line] * (1 + NEARLY)
-    start, end = np.int64(surface.ends[line, 0]), np.int64(surface.ends[line, 1])
+    start: Any = np.int64(surface.ends[line, 0])
+    end: Any = np.int64(surface.ends[line, 1])
     start, end = a if start == b else start, a if end == b else end
     reach[start], steps[start], steps[end] = 0.0, 1, 0
     touched = [start]
@@ -508,7 +509,7 @@ def leaves_line(surface: Surface, line: int, a: int, b: int, wanted: int, scratc
             c = surface.first[v if side == 0 else b]
             while c >= 0:
                 for k in range(1, 3):
-                    w = np.int64(surface.triangles[c // 3, (c % 3 + k) % 3])
+                    w: Any = np.int64(surface.triangles[c // 3, (c % 3 + k) % 3])
                     w = a if w == b else w
                     if surface.triangles[c // 3, 0] >= 0 and w != v:
                         along = surface.lines[v] & surface.lines[w] & bit
