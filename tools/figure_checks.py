@@ -158,7 +158,7 @@ class Checked:
         return gap
 
     def closed_frame(self, frames: Float32) -> Float32 | None:
-        """Return that of frames (T, 68), resolved, with closed lips that is furthest from rest, head unturned."""
+        """Return that of frames (T, 68) with closed lips that is furthest from rest, the head not turned."""
         points = self.figure.deformer.feature_points(
             np.concatenate([np.zeros_like(frames[:1]), frames]), local=True
         )
