@@ -105,6 +105,10 @@ ILLUSTRATIONS = {
     ): "a file found there",
     ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
     (
+        "docs/develop.md",
+        "python -m tools.figure_checks",
+    ): "takes minutes; test_closing.py runs two of its checks",
+    (
         "docs/emotion.md",
         "fba emote hello.fap -o moods.mp4 --side-by-side --emotion neutral --emotion angry=90 "
         "--emotion surprised=80 --emotion sad=90 --emotion sleepy=90 --emotion happy=80",

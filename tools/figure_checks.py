@@ -50,6 +50,8 @@ BRIGHT = 3000.0
 LIP_PAIRS = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
 CLOSED = 2e-5
 """Gap of upper and lower lip, more than at rest, up to which lips are closed, metres."""
+HEAD = slice(47, 50)
+"""Columns of the FAPs that turn the head."""
 TRIED = 60
 """Frames of a stream among which one with closed lips is sought."""
 LIDS_MEET = 2e-4
@@ -156,7 +158,7 @@ class Checked:
         return gap
 
     def closed_frame(self, frames: Float32) -> Float32 | None:
-        """Return that of frames (T, 68) of resolved FAPs with closed lips that is furthest from rest."""
+        """Return that of frames (T, 68) with closed lips that is furthest from rest, the head not turned."""
         points = self.figure.deformer.feature_points(
             np.concatenate([np.zeros_like(frames[:1]), frames]), local=True
         )
@@ -166,7 +168,9 @@ class Checked:
         if not len(closed):
             return None
         lips = [fap.number - 1 for fap in faps()[2:] if fap.group in (2, 8)]
-        return frames[closed[np.abs(frames[closed][:, lips]).sum(axis=1).argmax()]]
+        found = frames[closed[np.abs(frames[closed][:, lips]).sum(axis=1).argmax()]].copy()
+        found[HEAD] = 0.0  # the camera goes around the face
+        return found
 
     def mouth_line(self, scene: Scene, values: Float32, clip: Float64, size: tuple[int, int]) -> Bool:
         """Return a mask (H, W) of a picture's pixels on the line between closed lips. clip: the camera's."""
