@@ -7,6 +7,7 @@ body whose legs differ from the default skeleton's, so that its lower foot is as
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -64,17 +65,24 @@ def lowest_edge(
 
     frames: joint -> position (T, 3) and rotation (T, 3, 3). edge: `SOLE`, or a part of it.
     """
-    outwards = 1.0 if side == "l" else -1.0
-    points: dict[str, list[Float64]] = {}
-    for joint, x, y, z in edge:
-        name = f"{side}_{joint}"
-        height = skeleton.centres[skeleton.number(name), 1]
-        points.setdefault(name, []).append(np.array([outwards * x, y - height, z]))
     heights = []
-    for name, own in points.items():
-        position, frame = frames[name]
-        heights.append(position[:, 1] + (frame[..., 1, :] @ np.array(own).T).min(axis=-1))
+    for joint, own in _edge_points(tuple(edge), side):
+        position, frame = frames[joint]
+        height = skeleton.centres[skeleton.number(joint), 1]
+        up = frame[..., 1, :]
+        heights.append(position[:, 1] - up[..., 1] * height + (up @ own).min(axis=-1))
     return np.asarray(np.min(heights, axis=0))
+
+
+@cache
+def _edge_points(edge: tuple[tuple[str, float, float, float], ...], side: str) -> list[tuple[str, Float64]]:
+    """Return the joints of an edge on a side, each with its points, float64 (3, N)."""
+    outwards = np.array([1.0 if side == "l" else -1.0, 1.0, 1.0])
+    joints = dict.fromkeys(row[0] for row in edge)
+    return [
+        (f"{side}_{joint}", np.array([row[1:] * outwards for row in edge if row[0] == joint]).T)
+        for joint in joints
+    ]
 
 
 def lowest_sole(skeleton: Skeleton, matrices: Float64) -> Float64 | None:

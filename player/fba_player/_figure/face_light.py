@@ -43,6 +43,8 @@ CONSTANT_HARMONIC = 0.282095
 """The first spherical harmonic, equal in all directions."""
 TURN_DECIMALS = 2
 """Decimals to which the head's rotation is rounded; the light changes invisibly little."""
+PRODUCT = 4096
+"""Number of vertices whose light is one product of matrices."""
 MIN_SWAY = 0.05
 """Occlusion is not computed at vertices that turn with the head by less than this."""
 
@@ -257,13 +259,14 @@ def _lights(*turns: Float64) -> Float32:
 def _reaching(visibility: Float32, lights: Float32) -> Float32:
     """Return float32 (N, 4), as `FaceMesh.light`, by visibility (33, N): light, light through the skin, sky.
 
-    lights: (2, 16), as of `_lights`. By einsum: threads of linear algebra would keep the processors from
-    those that draw.
+    lights: (2, 16), as of `_lights`. In parts so small that linear algebra starts no threads, which would
+    keep the processors from those that draw.
     """
-    (key, rim), light = lights, np.empty((4, visibility.shape[1]), dtype=np.float32)
+    light = np.empty((4, visibility.shape[1]), dtype=np.float32)
     free, through = visibility[:HARMONICS], visibility[HARMONICS:-1]
-    np.einsum("kn,k->n", free, key, out=light[0])
-    np.einsum("kn,k->n", through, rim, out=light[2])
-    np.einsum("kn,k->n", free, rim, out=light[3])
+    for start in range(0, light.shape[1], PRODUCT):
+        part = slice(start, start + PRODUCT)
+        light[::3, part] = lights @ free[:, part]
+        light[2, part] = lights[1:] @ through[:, part]
     light[1] = visibility[-1]
     return np.ascontiguousarray(np.clip(light, 0.0, 1.0, out=light).T)
