@@ -207,7 +207,7 @@ class _Easing:
         return Motion(values, moving, unit * np.einsum("ki,pid->kpd", ways, moves[moving]))
 
     def _unfolded(self, fap: int, part: Part, borders: Int32, moves: Float64, unit: float) -> Motion | None:
-        """Return the motion without folds; None where there are none."""
+        """Return the motion without folds; None if it has none."""
         surface, limiter = self._of(part)
         motion, turning = self._motion(fap, borders, moves, unit), fap in TURNING
         if _is_sound(limiter, motion, turning):

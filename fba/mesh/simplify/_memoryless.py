@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -175,10 +176,7 @@ def simplify(
     )  # fmt: skip
     done = 0
     if total:
-        loops.link_corners(surface)
-        for line, (start, left) in enumerate(zip(surface.ends[:, 0], surface.left, strict=True)):
-            if start >= 0 and loops.leaves_line(surface, line, start, start, left, scratch):
-                surface.ends[line] = -1  # it is none to begin with
+        _link(surface, scratch)
         for target in [faces] if isinstance(faces, int) else faces:
             left = int(history.faces[done - 1]) if done else len(whole)
             done = loops.collapse_edges(surface, history, done, left, max(int(target), 1), scratch)
@@ -186,6 +184,16 @@ def simplify(
         places[0], corners, history.faces[:done].copy(), points, wedges, history.kept[:done].copy(),
         history.place[:done].copy(), (history.onto, history.step), (history.wedge_onto, history.wedge_step),
     )  # fmt: skip
+
+
+def _link(surface: Any, scratch: Any) -> None:
+    """Link the corners of a surface, and leave out lines that leave their way before anything collapses."""
+    from fba.mesh.simplify import _memoryless_loops as loops
+
+    loops.link_corners(surface)
+    for line, (start, left) in enumerate(zip(surface.ends[:, 0], surface.left, strict=True)):
+        if start >= 0 and loops.leaves_line(surface, line, start, start, left, scratch):
+            surface.ends[line] = -1
 
 
 def place_on_level(positions: Floating, level: Level) -> tuple[Int32, Float64]:

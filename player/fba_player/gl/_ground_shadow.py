@@ -16,7 +16,7 @@ from fba_player._figure.face_light import KEY_DIRECTION
 from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniform, write_buffer
 from fba_player.view._view import FaceMesh, FaceShape
 
-HEIGHTS = 128
+HEIGHTS = 256
 """Texels of the map of heights along each side."""
 CELLS = 64
 """Texels of the darkness along each side."""
