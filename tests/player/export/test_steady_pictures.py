@@ -47,8 +47,8 @@ def test_frames_of_equal_values_are_equal_to_the_last_pixel(body: bool) -> None:
 
 def test_eyes_and_mouth_of_a_slowly_turning_head_do_not_tick() -> None:
     """Change of a frame: sum over all pixels of differences from the frame before. No frame changes more than
-    1.35 times the mean of all; no block of 12 x 12 pixels with features, which change by more than 1 of 765 in
-    the mean, more than 3 times its own mean.
+    1.35 times the mean of all; no block of 12 x 12 pixels with features (those that change by more than 1 of
+    765 in the mean) more than 3 times its own mean.
     """
     frames = pictures([{"head_yaw": SLOW * number} for number in range(24)], body=True)
     steps = np.abs(np.diff(frames, axis=0)).sum(axis=3)
