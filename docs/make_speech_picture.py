@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from make_head_pictures import SAMPLES, UInt8
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import ConnectionPatch, FancyBboxPatch
 
 from fba import player
@@ -72,8 +73,9 @@ def main() -> UInt8:
                     color=COLOURS[shape.viseme], linewidth=1.6,
                 )
             )  # fmt: skip
-        figure.canvas.draw()
-        picture: UInt8 = np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        picture: UInt8 = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         plt.close(figure)
     return picture
 

@@ -19,17 +19,17 @@ HERE = Path(__file__).parent
 
 
 def bound_points(
-    surface: Refined, marks: sculpt.Marks, inner: dict[str, int], starts: dict[str, int]
+    surface: Refined, grown: Float64, marks: sculpt.Marks, inner: dict[str, int], starts: dict[str, int]
 ) -> tuple[Float64, Int32]:
     """Return feature points (84, 3), and the vertices (84,) they are bound to, by the rules of points.csv.
 
-    marks: of the surface. inner: vertices of points on parts other than the skin. starts: first vertex of
-    each part.
+    grown: the surface's vertices with hair, whose top and back are the head's. marks: of the surface. inner:
+    vertices of points on parts other than the skin. starts: first vertex of each part.
     """
     points, bound = np.full((len(names()), 3), np.nan), np.full(len(names()), -1, dtype=np.int32)
     outside = np.zeros(len(surface.vertices), dtype=bool)
     outside[surface.triangles[surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0]] = True
-    skin = Skin(surface.vertices, marks, outside)
+    skin = Skin(surface.vertices, grown, marks, outside)
     with (HERE / "points.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             name, part = row["point"], row["part"]
@@ -51,9 +51,11 @@ def bound_points(
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """The skin that points are bound to. marks: of its vertices. outside: (V,) mask of its outer side."""
+    """The skin that points are bound to. grown: its vertices with hair. marks: of its vertices. outside: (V,)
+    mask of its outer side."""
 
     vertices: Float64
+    grown: Float64
     marks: sculpt.Marks
     outside: Bool
 
@@ -86,11 +88,11 @@ def _on_lid(skin: Skin, positions: Float64, target: Float64) -> tuple[Float64, B
 
 
 def _at_top(skin: Skin, positions: Float64, target: Float64) -> tuple[Float64, Bool]:
-    return -positions[:, 1], np.abs(positions[:, 0]) < 1e-6
+    return -skin.grown[:, 1], np.abs(positions[:, 0]) < 1e-6
 
 
 def _at_back(skin: Skin, positions: Float64, target: Float64) -> tuple[Float64, Bool]:
-    return positions[:, 2], (np.abs(positions[:, 0]) < 1e-6) & (positions[:, 1] > -0.03)
+    return skin.grown[:, 2], (np.abs(positions[:, 0]) < 1e-6) & (positions[:, 1] > -0.03)
 
 
 RULES = {"near": _near, "lip": _on_lip, "lid": _on_lid, "top": _at_top, "back": _at_back}

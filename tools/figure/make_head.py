@@ -115,7 +115,9 @@ def parts_and_points(looks: Looks = ALEX, *, painted: bool = True) -> tuple[tupl
     starts = dict(
         zip([p.name for p in parts], np.cumsum([0, *(len(p.vertices) for p in parts)]), strict=False)
     )
-    points, bound = landmarks.bound_points(surface, marks, inner_points, starts)
+    points, bound = landmarks.bound_points(
+        surface, grow(surface.vertices, ALEX.hair), marks, inner_points, starts
+    )
     points = reshape(looks, points)
     for row in np.flatnonzero(bound >= 0):
         points[row] = np.concatenate([p.vertices for p in parts])[bound[row]]

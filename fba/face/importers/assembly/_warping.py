@@ -14,7 +14,9 @@ from fba.parameters import point_rows
 ROWS = {"9.8": "upper teeth", "9.10": "upper teeth", "9.9": "lower teeth", "9.11": "lower teeth"}
 """Parts that points of the teeth stand on."""
 UNWARPED_POINTS = ("3.5", "3.6", "3.7", "3.8", "3.11", "3.12", "6.1", "6.2", "6.3", "6.4")
-"""Points that are not used for the warp."""
+"""Points that are not used for the warp: pupils may lie behind the lids or in front of them."""
+HAIR = 0.3
+"""Distance (of the pupils) within which the crown may be that of hair, and does not shape the face."""
 FOLD_DISTANCE = 0.08
 """Usual distance of the fold of a lid from its margin, in distances of the pupils."""
 SMOOTHING = 0.1
@@ -45,9 +47,9 @@ def warp_points(
         if (left in known) != (right in known):
             present, absent = (left, right) if left in known else (right, left)
             known[absent] = known[present] * (-1, 1, 1) + (2 * middle, 0, 0)
-    # pupils may lie behind the lids or in front of them; they do not determine the skin
-    used = [name for name in known if name not in UNWARPED_POINTS]
     scale = float(known["3.5"][0] - known["3.6"][0]) / float(adult[row["3.5"], 0] - adult[row["3.6"], 0])
+    left_out = (*UNWARPED_POINTS, "11.4") if _may_be_hair(known, adult, scale) else UNWARPED_POINTS
+    used = [name for name in known if name not in left_out]
     source = np.array([adult[row[name]] for name in used])
     target = np.array([known[name] for name in used]) / scale
     warp = RBFInterpolator(source, target, kernel="linear", degree=1, smoothing=SMOOTHING)
@@ -79,6 +81,18 @@ def warp_points(
         points[row[name]] = np.nan if tree is None else tree.data[tree.query(points[row[name]])[1]]
     _put_folds_beyond_lids(pieces, points)
     return points
+
+
+def _may_be_hair(known: Mapping[str, Float64], adult: Float64, scale: float) -> bool:
+    """Whether the crown (11.4) is off the adult head's by no more than hair is thick."""
+    row = point_rows()
+    if "11.4" not in known:
+        return False
+    right, left = adult[[row["3.6"], row["3.5"]]]
+    off = (known["11.4"] - (known["3.5"] + known["3.6"]) / 2) / scale - (
+        adult[row["11.4"]] - (left + right) / 2
+    )
+    return bool(np.linalg.norm(off[1:]) < HAIR * (left[0] - right[0]))
 
 
 def _put_folds_beyond_lids(pieces: Sequence[Piece], points: Float64) -> None:
