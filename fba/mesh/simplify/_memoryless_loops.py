@@ -698,7 +698,7 @@ def _collapse(
     history.onto[gone] = keep
     history.step[gone] = step
     for line in range(len(surface.ends)):
-        surface.left[line] -= surface.lines[keep] & surface.lines[gone] >> line & 1
+        surface.left[line] -= (surface.lines[keep] & surface.lines[gone]) >> line & 1
         for i in range(2):
             if surface.ends[line, i] == gone:
                 surface.ends[line, i] = keep
