@@ -186,7 +186,8 @@ def test_a_seam_stays_closed_and_its_sides_keep_their_looks() -> None:
     vertices = np.concatenate([one, other])
     both = np.concatenate([triangles, triangles[:, ::-1] + len(one)]).astype(np.int32)
     looks = np.concatenate([one[:, :2], 5 + one[:, :2]])
-    level = simplify(vertices[None], both, 200, looks=looks).level(200)
+    part = np.zeros((len(looks), 1))
+    level = simplify(vertices[None], both, 200, looks=np.hstack([part, looks])).level(200)
     assert len(level.positions) > len(np.unique(level.points))
     inner = [pair for pair in edges_once(whole(level)) if pair not in outer_edges(level)]
     assert not inner  # no edge between the halves gapes

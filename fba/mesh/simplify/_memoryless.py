@@ -28,6 +28,8 @@ class Level:
     positions: float64 (M, 3), at rest. triangles: int32 (F, 3). parents: int32 (N,), the vertex of this level
     that stands for each vertex of the full mesh. points: int32 (M,), equal for vertices along a seam that are
     one. rows, weights: int32 and float64 (M, 3), vertices of the full mesh that each is interpolated from.
+    gone: bool (N,), vertices of which nothing is left, as of a hair that went as a whole; their parents are
+    the nearest vertices of the part.
     """
 
     positions: Float64
@@ -36,6 +38,7 @@ class Level:
     points: Int32
     rows: Int32
     weights: Float64
+    gone: Bool
 
     def carry(self, values: Floating) -> Float64:
         """Return values (M, ...) at this level's vertices of those (N, ...) at the full mesh's."""
@@ -56,6 +59,7 @@ class Simplification:
     faces: Int32
     _points: Int32
     _wedges: Int32
+    _parts: Int32
     _kept: Int32
     _place: Float64
     _forest: tuple[Int32, Int32]
@@ -86,13 +90,30 @@ class Simplification:
         number = np.full(len(home), -1, dtype=np.int32)
         number[used] = np.arange(len(used))
         # a side of a seam that has no triangle left: any other vertex at its place stands for it
-        beside = np.zeros(len(place), dtype=np.int32)
+        beside = np.full(len(place), -1, dtype=np.int32)
         beside[points] = number[used]
         parents = np.where(number[wedge] >= 0, number[wedge], beside[root]).astype(np.int32)
         positions = place[points]
+        gone = parents < 0
+        self._adopt(parents, positions)
         triangles = np.ascontiguousarray(corner.reshape(-1, 3), dtype=np.int32)
         rows, weights = self._sources(positions, parents)
-        return Level(positions, triangles, parents, points, rows, weights)
+        return Level(positions, triangles, parents, points, rows, weights, gone)
+
+    def _adopt(self, parents: Int32, positions: Float64) -> None:
+        """Write the parents of vertices that have none, -1: the nearest of the vertices, (M, 3), that stand
+        for others of their part."""
+        from scipy.spatial import cKDTree
+
+        lost = parents < 0
+        for part in np.unique(self._parts[lost]):
+            own = self._parts == part
+            left = np.unique(parents[own & ~lost])
+            left = left if len(left) else np.arange(len(positions))
+            if len(left):
+                near = cKDTree(positions[left]).query(self.positions[own & lost])[1]
+                parents[own & lost] = left[near]
+        parents[parents < 0] = 0  # no triangle is left
 
     @cached_property
     def _full(self) -> Int32:
@@ -118,8 +139,9 @@ def simplify(
     """Return the simplification of a mesh down to a number of triangles, or through several, falling.
 
     poses: (K, N, 3), the vertices in K poses, the first at rest. triangles: (F, 3). pinned: (N,), vertices
-    that stay where they are. looks: (N, A), texture coordinates and colours: vertices of one position and
-    different looks are a seam, which stays closed; without, or with equal ones, they are one vertex.
+    that stay where they are. looks: (N, A), number of the part, texture coordinates and colours: vertices of
+    one position and different looks are a seam, which stays closed; without, or with equal ones, they are one
+    vertex. A triangle that touches no other, such as a hair, may go, but not the last one of its part.
     importance: (N,), factors of the cost around each vertex, 1 by default. lines: (N,), a bit for each line
     through a vertex, such as a lid's margin: neighbours of one line collapse along it only.
 
@@ -146,6 +168,8 @@ def simplify(
     whole = points[corners]
     proper = (whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])
     whole, sides = np.ascontiguousarray(whole[proper]), np.ascontiguousarray(wedges[corners[proper]])
+    parts = _number_rows(given[:, :1]) if given.shape[1] else np.zeros(count, np.int32)
+    part = parts[corners[proper, 0]]
     kind = _kinds(whole, sides, total)
     if pinned is not None:
         kind[points[_per_vertex(pinned, count, "pinned") > 0]] = loops.PINNED
@@ -162,6 +186,7 @@ def simplify(
     surface = loops.Surface(
         welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
         kind, np.zeros(total, np.int64), weight, through, *_measure_lines(welded[:, 0], whole, through),
+        part, np.bincount(part, minlength=1).astype(np.int32),
     )  # fmt: skip
     number = int(wedges.max(initial=-1)) + 1
     history = loops.History(
@@ -181,7 +206,7 @@ def simplify(
             left = int(history.faces[done - 1]) if done else len(whole)
             done = loops.collapse_edges(surface, history, done, left, max(int(target), 1), scratch)
     return Simplification(
-        places[0], corners, history.faces[:done].copy(), points, wedges, history.kept[:done].copy(),
+        places[0], corners, history.faces[:done].copy(), points, wedges, parts, history.kept[:done].copy(),
         history.place[:done].copy(), (history.onto, history.step), (history.wedge_onto, history.wedge_step),
     )  # fmt: skip
 
@@ -198,9 +223,12 @@ def _link(surface: Any, scratch: Any) -> None:
 
 def place_on_level(positions: Floating, level: Level) -> tuple[Int32, Float64]:
     """Return where each vertex (N, 3) of the full mesh lies on a level: int32 (N, 3), vertices of the level,
-    and float64 (N, 3), their weights. Only triangles around the vertex that stands for it count."""
+    and float64 (N, 3), their weights, 0 for what is gone. Only triangles around the vertex that stands for it
+    count."""
     corners = level.positions[level.triangles]
-    return _nearest(positions, corners, level.triangles, level.parents, level.triangles)
+    rows, weights = _nearest(positions, corners, level.triangles, level.parents, level.triangles)
+    weights[level.gone] = 0.0
+    return rows, weights
 
 
 def place_on_full(

@@ -47,6 +47,7 @@ class Surface(NamedTuple):
     importance: (V,), factors of the cost. lines: (V,), a bit for each line through a vertex that is kept.
     ends: int32 (L, 2), the first and the last vertex of each line, -1 for a line that need not stay the
     shortest way between them. left, longest: int32 and float64 (L,), vertices left, and the first length.
+    part, share: int32 (F,) and (P,), the part of each triangle, and how many each part has left.
     """
 
     places: Float64
@@ -61,6 +62,8 @@ class Surface(NamedTuple):
     ends: Int32
     left: Int32
     longest: Float64
+    part: Int32
+    share: Int32
 
 
 class History(NamedTuple):
@@ -329,6 +332,18 @@ def _cost_at(sums: Float64, place: Float64, t: float) -> float:
 
 
 @compiled
+def _cost_alone(surface: Surface, scratch: Scratch) -> float:
+    """Return the cost of a triangle that touches no other, the only one in the ring, with which it goes as a
+    whole. It counts as if it were as wide as it is long: a hair has little area, yet its lack is seen."""
+    corners, squared = surface.triangles[scratch.ring[0]], 0.0
+    for i in range(3):
+        way = _distance(surface.places[corners[i], 0], surface.places[corners[(i + 1) % 3], 0])
+        squared = max(squared, way * way)
+    scratch.squared[0] = squared * squared
+    return surface.places.shape[1] * (1 - SURFACE_SHARE) / 2 * squared**3
+
+
+@compiled
 def _find_place(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[float, float]:
     """Write where the edge from a to b is best collapsed to, relative to a; return the cost and where that
     is along the edge, 0 for a and 1 for b. The cost is -1 for an edge that must stay."""
@@ -345,6 +360,9 @@ def _find_place(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[flo
     for i in range(3):
         edge[i] = places[b, 0, i] - places[a, 0, i]
         squared += edge[i] * edge[i]
+    if count == 1:
+        scratch.place[:] = 0.0
+        return _cost_alone(surface, scratch), 0.0
     volume = _sum_changes(surface, a, b, count, scratch)
     if kind[a] != FREE or kind[b] != FREE:
         _add_lines(surface, a, b, count, (1 - SURFACE_SHARE) * squared / 4, scratch)
@@ -451,17 +469,30 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
         c = surface.follow[c]
     for i in range(own):
         common += seen[i]
-    faces = 0
+    faces, one = 0, -1
     c = surface.first[a]
     while c >= 0:
         t = c // 3
         if surface.triangles[t, 0] >= 0 and _corner_of(surface.triangles[t], b) >= 0:
-            faces += 1
+            faces, one = faces + 1, t
         c = surface.follow[c]
+    if faces == 1 and both == 3:
+        return _may_go(surface, one)
     border = _on_border(surface, a) or _on_border(surface, b)
     if _on_border(surface, a) and _on_border(surface, b) and faces != 1:
         return False
     return common == faces and 1 <= faces <= 2 and both > (3 if border else 4)
+
+
+@compiled
+def _may_go(surface: Surface, t: int) -> bool:
+    """Return whether a triangle that touches no other may go: not the last of its part, nor one with a vertex
+    that stays, by itself or as one of a line."""
+    free = surface.share[surface.part[t]] > 1
+    for k in range(3):
+        v = surface.triangles[t, k]
+        free = free and surface.kind[v] != PINNED and surface.lines[v] == 0
+    return bool(free)
 
 
 @compiled
@@ -723,6 +754,7 @@ def _collapse(
             wedges[t, k] = history.wedge_onto[wedges[t, k]]
             if _corner_of(triangles[t], keep) >= 0:
                 triangles[t, 0] = -1
+                surface.share[surface.part[t]] -= 1
             else:
                 triangles[t, k] = keep
         c = surface.follow[c]
