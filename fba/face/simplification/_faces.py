@@ -22,7 +22,7 @@ from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
 from fba.face.importers.assembly._repair import repair_tables, take_sounder
 from fba.face.model import DetailLevel, FaceModel, shape_key
-from fba.face.simplification._tables import find_lines, fit_tables
+from fba.face.simplification._tables import find_balls, find_lines, fit_tables
 from fba.mesh.simplify import (
     Level,
     Simplification,
@@ -176,10 +176,10 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         poses,
         model.triangles,
         faces,
-        pinned=kept,
         looks=part_looks(model),
-        importance=_importance(model),
+        importance=np.where(kept, np.inf, _importance(model)),
         lines=lines,
+        balls=find_balls(model),
     )
     return FaceSimplification(model, mesh, poses, kept | (lines > 0))
 

@@ -131,19 +131,21 @@ def simplify(
     triangles: Integer,
     faces: int | Sequence[int],
     *,
-    pinned: Bool | None = None,
     looks: Floating | None = None,
     importance: Floating | None = None,
     lines: Integer | None = None,
+    balls: Floating | None = None,
 ) -> Simplification:
     """Return the simplification of a mesh down to a number of triangles, or through several, falling.
 
-    poses: (K, N, 3), the vertices in K poses, the first at rest. triangles: (F, 3). pinned: (N,), vertices
-    that stay where they are. looks: (N, A), number of the part, texture coordinates and colours: vertices of
-    one position and different looks are a seam, which stays closed; without, or with equal ones, they are one
-    vertex. A triangle that touches no other, such as a hair, may go, but not the last one of its part.
-    importance: (N,), factors of the cost around each vertex, 1 by default. lines: (N,), a bit for each line
-    through a vertex, such as a lid's margin: neighbours of one line collapse along it only.
+    poses: (K, N, 3), the vertices in K poses, the first at rest. triangles: (F, 3). looks: (N, A), number of
+    the part, texture coordinates and colours: vertices of one position and different looks are a seam, which
+    stays closed; without, or with equal ones, they are one vertex. A triangle that touches no other, such as
+    a hair, may go, but not the last one of its part. importance: (N,), factors of the cost around each
+    vertex, 1 by default, infinite for one that stays where it is. lines: (N,), a bit for each line through a
+    vertex, such as a lid's margin: neighbours of one line collapse along it only. balls: (B, 7 + R), what
+    triangles must not cut in the poses, such as eyeballs: centre (3), gaze (3), size, and R >= 2 radii at
+    equal steps of the angle from the gaze, 0 to 180 degrees.
 
     An edge's cost is the source's (half the squared volumes that the collapse sweeps, half the squared areas
     along borders and seams times the squared length of the edge), summed over the poses, over the area around
@@ -171,13 +173,14 @@ def simplify(
     parts = _number_rows(given[:, :1]) if given.shape[1] else np.zeros(count, np.int32)
     part = parts[corners[proper, 0]]
     kind = _kinds(whole, sides, total)
-    if pinned is not None:
-        kind[points[_per_vertex(pinned, count, "pinned") > 0]] = loops.PINNED
     welded = np.empty((total, len(places), 3))
     welded[points] = places.transpose(1, 0, 2)
     weight = np.ones(total)
     if importance is not None:
-        weight[points] = _per_vertex(importance, count, "importance")
+        factors = _per_vertex(importance, count, "importance")
+        weight[points] = factors
+        kind[points[np.isinf(factors)]] = loops.PINNED
+        weight[np.isinf(weight)] = 1.0
     through = np.zeros(total, np.int64)
     if lines is not None:
         np.bitwise_or.at(through, points, _per_vertex(lines, count, "lines").astype(np.int64))
@@ -186,7 +189,7 @@ def simplify(
     surface = loops.Surface(
         welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
         kind, np.zeros(total, np.int64), weight, through, *_measure_lines(welded[:, 0], whole, through),
-        part, np.bincount(part, minlength=1).astype(np.int32),
+        part, np.bincount(part, minlength=1).astype(np.int32), _check_balls(balls),
     )  # fmt: skip
     number = int(wedges.max(initial=-1)) + 1
     history = loops.History(
@@ -301,7 +304,7 @@ def _on_triangles(points: Floating, corners: Floating) -> tuple[Float64, Float64
 
 def _per_vertex(values: Floating | Integer | Bool, count: int, what: str) -> Float64:
     array = np.asarray(values, dtype=np.float64)
-    if array.shape != (count,) or not np.isfinite(array).all() or (array < 0).any():
+    if array.shape != (count,) or np.isnan(array).any() or (array < 0).any():
         raise ModelError(f"{what} must be {count} numbers that are not negative, one for each vertex")
     return array
 
@@ -317,6 +320,13 @@ def _check(poses: Floating, triangles: Integer) -> tuple[Float64, Int32]:
     if corners.size and not 0 <= corners.min() <= corners.max() < places.shape[1]:
         raise ModelError(f"triangles name vertices beyond the {places.shape[1]} that exist")
     return places, np.ascontiguousarray(corners, dtype=np.int32)
+
+
+def _check_balls(balls: Floating | None) -> Float64:
+    rows = np.zeros((0, 9)) if balls is None else np.array(balls, dtype=np.float64, ndmin=2)
+    if rows.ndim != 2 or rows.shape[1] < 9 or not np.isfinite(rows).all() or not (rows[:, 6] > 0).all():
+        raise ModelError(f"balls must have rows of 9 finite numbers or more, with a size, not {rows.shape}")
+    return np.ascontiguousarray(rows)
 
 
 def _number_rows(rows: Float64) -> Int32:

@@ -18,6 +18,7 @@ import numpy as np
 
 from fba.arrays import Float64, Int32, Int64
 from fba.compiled import compiled, inlined
+from fba.mesh.simplify._balls import cut_depth, is_near
 
 MAX_RING = 64
 """A vertex with more triangles than this takes no part in collapses."""
@@ -32,6 +33,8 @@ MIN_COMPACTNESS = 0.1
 """No triangle becomes less compact than this, 1 for an equilateral one, while others can go."""
 NEARLY = 1e-5
 """Share by which a way beside a line must be longer: positions are rounded when a line is looked for."""
+MAX_CUT = 0.005
+"""Depth to which triangles may cut a ball in a pose, as a share of its size."""
 MAX_ON_LINE = 1 << 30
 """More vertices than a line has."""
 FREE, ON_LINE, PINNED = 0, 1, 2
@@ -47,7 +50,8 @@ class Surface(NamedTuple):
     importance: (V,), factors of the cost. lines: (V,), a bit for each line through a vertex that is kept.
     ends: int32 (L, 2), the first and the last vertex of each line, -1 for a line that need not stay the
     shortest way between them. left, longest: int32 and float64 (L,), vertices left, and the first length.
-    part, share: int32 (F,) and (P,), the part of each triangle, and how many each part has left.
+    part, share: int32 (F,) and (P,), the part of each triangle, and how many each part has left. balls:
+    float64 (B, 7 + N), what triangles must not cut in poses; see `_balls`.
     """
 
     places: Float64
@@ -64,6 +68,7 @@ class Surface(NamedTuple):
     longest: Float64
     part: Int32
     share: Int32
+    balls: Float64
 
 
 class History(NamedTuple):
@@ -403,11 +408,14 @@ def _priority(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[float
     """Return the cost of an edge by which edges are ordered, and where along it the collapse goes.
 
     That is the cost over the area around the edge, so that a finely modelled region, whose triangles are
-    small, is not the first to go, times the importance of its ends. -1 for an edge that must stay.
+    small, is not the first to go, times the importance of its ends that may move. -1 for an edge that must
+    stay.
     """
     cost, along = _find_place(surface, a, b, scratch)
     if cost > 0.0 and scratch.squared[0] > 0.0:
-        cost *= 0.5 * (surface.importance[a] + surface.importance[b]) / np.sqrt(scratch.squared[0])
+        one = surface.importance[b if surface.kind[a] == PINNED else a]
+        other = surface.importance[a if surface.kind[b] == PINNED else b]
+        cost *= 0.5 * (one + other) / np.sqrt(scratch.squared[0])
     return cost, along
 
 
@@ -627,6 +635,46 @@ def _turns_over(
     return False
 
 
+@compiled
+def _cuts_ball(surface: Surface, a: int, b: int, t: float, count: int, scratch: Scratch) -> bool:
+    """Return whether a triangle would cut a ball in a pose, and deeper than those around the edge do."""
+    for ball in surface.balls:
+        near = False
+        for k in range(surface.places.shape[1]):
+            near = near or is_near(ball, surface.places[a, k])
+        if near:
+            after = _deepest(surface, ball, a, b, t, count, scratch)
+            if after > MAX_CUT and after > _deepest(surface, ball, -1, -1, t, count, scratch):
+                return True
+    return False
+
+
+@compiled
+def _deepest(
+    surface: Surface, ball: Float64, a: int, b: int, t: float, count: int, scratch: Scratch
+) -> float:
+    """Return how deep the triangles of the ring cut a ball, in the worst pose, where the edge from a to b has
+    collapsed; -1 twice for as they are."""
+    places, corners, deepest = surface.places, np.empty((2, 3, 3)), 0.0
+    for i in range(count):
+        triangle = surface.triangles[scratch.ring[i]]
+        if a >= 0 and _corner_of(triangle, a) >= 0 and _corner_of(triangle, b) >= 0:
+            continue
+        for k in range(places.shape[1]):
+            for at in range(3):
+                v = triangle[at]
+                for n in range(3):
+                    if v in (a, b):
+                        corners[min(k, 1), at, n] = (
+                            places[a, k, n] + scratch.place[n] + t * scratch.sums[k, 10 + n]
+                        )
+                    else:
+                        corners[min(k, 1), at, n] = places[v, k, n]
+            if k > 0:
+                deepest = max(deepest, cut_depth(ball, corners[0], corners[1]))
+    return deepest
+
+
 @inlined
 def _square(x: float, y: float, z: float) -> float:
     """Return the squared length of a vector."""
@@ -674,7 +722,11 @@ def collapse_edges(
                 lost += _corner_of(corners, a) >= 0 and _corner_of(corners, b) >= 0
             if faces - lost < target or _turns_over(surface, a, b, along, count, least, scratch):
                 continue
-            if not _is_valid(surface, a, b, scratch) or (least > 0.0 and _cuts_line(surface, a, b, scratch)):
+            if not _is_valid(surface, a, b, scratch):
+                continue
+            if least > 0.0 and (
+                _cuts_line(surface, a, b, scratch) or _cuts_ball(surface, a, b, along, count, scratch)
+            ):
                 continue
             kind, other = surface.kind[a], surface.kind[b]
             if other > kind or (other == kind and kind != FREE and along > 0.0):
