@@ -137,7 +137,7 @@ def test_pinned_vertices_stay_where_they_are() -> None:
     vertices, triangles = ball()
     pinned = np.zeros(len(vertices), dtype=bool)
     pinned[::29] = True
-    level = simplify(vertices[None], triangles, 80, pinned=pinned).level(80)
+    level = simplify(vertices[None], triangles, 80, importance=np.where(pinned, np.inf, 1)).level(80)
     np.testing.assert_array_equal(level.positions[level.parents[pinned]], vertices[pinned])
     np.testing.assert_allclose(level.carry(vertices)[level.parents[pinned]], vertices[pinned], atol=1e-12)
 
@@ -166,7 +166,7 @@ def test_lines_stay_the_shortest_way(seed: int) -> None:
     for bit, way in enumerate(ways):
         lines[way] |= 1 << bit
         pinned[way[[0, -1]]] = True
-    made = simplify(vertices[None], triangles, 150, pinned=pinned, lines=lines)
+    made = simplify(vertices[None], triangles, 150, importance=np.where(pinned, np.inf, 1), lines=lines)
     assert len(made.level(150).triangles) == 150
     for faces in (1200, 600, 400):
         level = made.level(faces)
@@ -186,7 +186,8 @@ def test_a_seam_stays_closed_and_its_sides_keep_their_looks() -> None:
     vertices = np.concatenate([one, other])
     both = np.concatenate([triangles, triangles[:, ::-1] + len(one)]).astype(np.int32)
     looks = np.concatenate([one[:, :2], 5 + one[:, :2]])
-    level = simplify(vertices[None], both, 200, looks=looks).level(200)
+    part = np.zeros((len(looks), 1))
+    level = simplify(vertices[None], both, 200, looks=np.hstack([part, looks])).level(200)
     assert len(level.positions) > len(np.unique(level.points))
     inner = [pair for pair in edges_once(whole(level)) if pair not in outer_edges(level)]
     assert not inner  # no edge between the halves gapes
@@ -297,7 +298,7 @@ def test_a_single_triangle_and_a_tetrahedron_stay() -> None:
         (np.zeros((1, 3, 3)), [[0, 1, -1]], {}, "vertices beyond the 3"),
         (np.zeros((1, 3, 3)), [[0.0, 1, 2]], {}, "whole numbers"),
         (np.zeros((1, 3, 3)), [0, 1, 2], {}, "whole numbers"),
-        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"pinned": np.zeros(2, bool)}, "pinned must be 3 numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"importance": np.ones(2)}, "importance must be 3 numbers"),
         (np.zeros((1, 3, 3)), [[0, 1, 2]], {"importance": np.full(3, -1.0)}, "importance must be 3 numbers"),
         (np.zeros((1, 3, 3)), [[0, 1, 2]], {"looks": np.zeros((2, 2))}, "looks must have 3 rows"),
     ],
