@@ -12,7 +12,8 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import islice
+from itertools import islice, product
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,10 @@ from fba.speech import (
     split_text,
 )
 
+GOALS: dict[Coding, int] = {"visemes": 200, "faps": 500}
+"""Bits in a second."""
+COUNTS = (1, 2, 4, 12, 60)
+"""Sentences in a stream."""
 FRAME = 0.01
 """Seconds between the moments at which visemes are compared."""
 SHUT, CLOSURE = 40, 0.04
@@ -125,10 +130,13 @@ def telephone(sound: Int16) -> Int16:
 class Coded:
     """A stream of speech: bits in a second, share of right visemes, and errors of the lips in mm.
 
+    seconds: its length. left_out: share of the sounds that are left out to keep the goal of the coding.
     closures: seconds by which the lips miss each p, b or m.
     """
 
+    seconds: float
     bits: float
+    left_out: float
     right: float
     mean: float
     largest: float
@@ -146,11 +154,14 @@ def measure_coding(coding: Coding, sentences: Iterable[Spoken]) -> Coded:
     made = perform(speech, coding=coding, life=0)
     data = encode(made, encoder_options(coding))
     decoded = decode(data)
-    full = perform(speech, coding=coding, life=0, rate=Fraction(100))
+    sounds = len(perform(speech, coding=coding, life=0, keep_goal=False))
+    full = perform(speech, coding=coding, life=0, rate=Fraction(100), keep_goal=False)
     mean, largest = _lip_errors(decoded, full)
     true = visemes(find_shapes(phones), end)
     right = float((visemes(read_shapes(decoded), end)[: len(true)] == true).mean())
-    return Coded(8 * len(data) / end, right, mean, largest, closure_errors(decoded, phones))
+    left_out = 1 - len(made) / sounds
+    closures = closure_errors(decoded, phones)
+    return Coded(end, 8 * len(data) / end, left_out, right, mean, largest, closures)
 
 
 def _lip_errors(decoded: Animation, full: Animation) -> tuple[float, float]:
@@ -199,15 +210,30 @@ def main() -> None:
                 f"| {without.mean():.1%} | {counts.failed} | {_closed(counts.closures)} |",
                 flush=True,
             )
-    print("\n| coding | goal, bit/s | bit/s | viseme right | lips, mean mm | 95 % within, mm | lips shut |")
-    print("|---|---|---|---|---|---|---|")
-    codings: tuple[tuple[Coding, int], ...] = (("visemes", 200), ("faps", 500))
-    for coding, goal in codings:
-        for name, sentences in sets.items():
-            kept = measure_coding(coding, sentences)
-            right = f"{kept.right:.1%}" if coding == "visemes" else "-"
-            lips = f"{kept.mean:.2f} | {kept.largest:.2f} | {_closed(kept.closures)}"
-            print(f"| {coding}, {name} | {goal} | {kept.bits:.0f} | {right} | {lips} |", flush=True)
+    print_codings(sets)
+
+
+def print_codings(sets: dict[str, list[Spoken]]) -> None:
+    """Print what streams keep, of one sentence to all of them."""
+    print("\n| coding | goal, bit/s | sentences | in one stream | seconds | bit/s | within the goal | left out "
+          "| viseme right | lips, mean mm | 95 % within, mm | lips shut |")  # fmt: skip
+    print(f"|{'---|' * 12}")
+    for (coding, goal), (name, sentences) in product(GOALS.items(), sets.items()):
+        for count in COUNTS:
+            parts = [sentences[at : at + count] for at in range(0, len(sentences), count)]
+            kept = [measure_coding(coding, part) for part in parts]
+            bits, left_out, right, mean, largest = (
+                fmean(getattr(each, field) for each in kept)
+                for field in ("bits", "left_out", "right", "mean", "largest")
+            )
+            within = sum(each.bits <= goal for each in kept)
+            print(
+                f"| {coding} | {goal} | {name} | {count} | {fmean(each.seconds for each in kept):.1f} "
+                f"| {bits:.0f} | {within} of {len(kept)} | {left_out:.0%} "
+                f"| {right:.1%} | {mean:.2f} | {largest:.1f} "
+                f"| {_closed([error for each in kept for error in each.closures])} |",
+                flush=True,
+            )
 
 
 def _closed(errors: list[float]) -> str:

@@ -28,8 +28,11 @@ ROUNDED, AHEAD_FALL = (13, 14), 8.0
 """Visemes that round the lips, and how slowly their pull on the lips rises before them."""
 REST_PULL = 0.06
 """Pull towards the neutral face, everywhere."""
-CLOSURES = {1: 0.020, 2: 0.010}
-"""Visemes at which lips, or lip and teeth, must meet, and seconds from the centre within which they do."""
+CLOSURES = {1: 0.020, 2: 0.010, 3: 0.010}
+"""Visemes at which lips, lip and teeth, or tongue and teeth must meet; seconds on each side of the centre for
+which they do."""
+TONGUE_BETWEEN_TEETH = 3
+"""The viseme whose closure leaves it to its neighbours whether lips are rounded or spread."""
 RELEASE = 0.035
 """Seconds before and after that within which the lips part."""
 
@@ -125,11 +128,14 @@ def _closures(shapes: Sequence[Shape], rate: Fraction, count: int) -> Float64:
 
 
 def _close(values: Float64, shapes: Sequence[Shape], rate: Fraction, table: Float32) -> None:
-    """Let lips meet at the closures, whatever their neighbours want. The nearest frame is always closed."""
+    """Let lips, teeth and tongue meet at closures, whatever is beside them. The nearest frame is closed."""
     for shape in shapes:
         for first, weights in _closure_frames(shape, rate, len(values)):
             part = values[first : first + len(weights)]
-            part += weights[:, None] * (table[shape.viseme] - part)
+            change = weights[:, None] * (table[shape.viseme] - part)
+            if shape.viseme == TONGUE_BETWEEN_TEETH:
+                change[:, _columns("rounding")] = 0
+            part += change
 
 
 def _closure_frames(shape: Shape, rate: Fraction, count: int) -> list[tuple[int, Float64]]:
