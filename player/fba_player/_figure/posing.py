@@ -23,7 +23,7 @@ AT_EASE = {
     "middle1_flexion": -21, "middle2_flexion": -26, "middle3_flexion": -14,
     "ring1_flexion": -25, "ring2_flexion": -29, "ring3_flexion": -16, "ring1_pivot": 1,
     "pinky1_flexion": -28, "pinky2_flexion": -30, "pinky3_flexion": -16, "pinky1_pivot": 3,
-    "thumb1_flexion": -8, "thumb1_pivot": -16, "thumb2_flexion": -14, "thumb3_flexion": -16,
+    "thumb1_pivot": 20, "thumb2_flexion": -10, "thumb3_flexion": -14,
 }  # fmt: skip
 """Degrees of the BAPs of a left hand at ease, by name; `pivot` opens a right hand the other way."""
 SAID = 0.15
