@@ -190,8 +190,10 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     gloss = 0.38 + 0.06 * oily + 0.10 * lips + 0.14 * wet + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped) + 0.16 * cropped
-    throat = smoothstep((-0.012 - z) / 0.055) * (near & (ring < 0))
-    colours[:, :3] *= 1 - throat[:, None] * (0.62, 0.75, 0.75)
+    inside = near & (ring < 0)
+    depth = np.maximum(smoothstep((-0.012 - z) / 0.055), 0.8 * smoothstep((-ring - 0.5) / 3.5)) * inside
+    colours[:, :3] *= 1 - depth[:, None] * (0.68, 0.78, 0.78)
+    colours[:, 3] *= np.where(near, 0.1 + 0.9 * smoothstep(ring / sculpt.CONTACT_RING), 1.0)  # no sky in there
     colours[:, :3] *= _nostrils(surface)[:, None]
     return colours
 
