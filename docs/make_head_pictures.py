@@ -145,3 +145,7 @@ def visemes() -> UInt8:
 
 def faps() -> UInt8:
     return player.contact_sheet("faps", tile=(150, 150))
+
+
+def proof() -> UInt8:
+    return player.contact_sheet("proof", tile=(132, 165))

@@ -55,6 +55,7 @@ PICTURES = {
     "photos.jpg": "make_photo_picture.main",
     "points.jpg": "make_player_pictures.points",
     "postures.jpg": "make_body_pictures.postures",
+    "proof.jpg": "make_head_pictures.proof",
     "real-recordings-bodies-bars.svg": "make_bitrate_page.pictures",
     "real-recordings-bodies.svg": "make_bitrate_page.pictures",
     "real-recordings-faces-bars.svg": "make_bitrate_page.pictures",

@@ -109,6 +109,10 @@ ILLUSTRATIONS = {
         "python -m tools.figure_checks",
     ): "takes minutes; test_closing.py runs two of its checks",
     (
+        "docs/develop.md",
+        "python -m tools.figure_sheets sheets",
+    ): "needs the shared recordings, and takes minutes",
+    (
         "docs/emotion.md",
         "fba emote hello.fap -o moods.mp4 --side-by-side --emotion neutral --emotion angry=90 "
         "--emotion surprised=80 --emotion sad=90 --emotion sleepy=90 --emotion happy=80",

@@ -3,10 +3,11 @@
 python -m tools.figure_checks [--figure NAME] [--only mouth|lids|inside|hands]... [--frames 2000] [FILE...]
 
 mouth: pictures of the person, 360, 720 and 1080 lines high, show neither background nor the inside of the
-mouth between lips that a stream closes. lids: closed lids meet within 0.2 mm. inside: tongue and teeth pass
-through no skin, over all FAPs in steps, lips closed and open, and over frames of the streams. hands: are
-outside the thighs. Without files, the samples and the shared recordings (FBA_SHARED, else ../shared beside
-the checkout) are taken, for hands the samples. It prints each finding, and ends with 1 where there is one.
+mouth between lips that a stream closes. lids: closed lids meet within 0.2 mm. inside: tongue, teeth and
+walls of the mouth pass through no skin, over all FAPs in steps, lips closed and open, and over frames of the
+streams. hands: are outside the thighs. Without files, the samples and the shared recordings (FBA_SHARED,
+else ../shared beside the checkout) are taken, for hands the samples. It prints each finding, and ends with 1
+where there is one.
 """
 
 from __future__ import annotations
@@ -124,8 +125,10 @@ class Checked:
         return np.asarray(triangles[near & ~self.of_model(red)[triangles].any(axis=1)])
 
     def inner_edges(self) -> Intp:
-        """Return (E, 2): edges of tongue and teeth, vertices counted through the model."""
-        found = []
+        """Return (E, 2): edges of tongue, teeth and walls of the mouth, vertices counted through the model."""
+        skin = self.model.part("skin").triangles.astype(np.intp) + self.model.starts["skin"]
+        corners = np.sort(skin[self.walls()[skin].all(axis=1)][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        found = [np.unique(corners, axis=0)]
         for part in self.model.parts:
             if part.kind in ("tongue", "teeth"):
                 corners = np.sort(part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -263,7 +266,7 @@ def check_inside(checked: Checked, poses: Iterable[tuple[str, Float32]]) -> Iter
     edges, skin = checked.inner_edges(), checked.outer_skin()
     for name, values in poses:
         if count := pierced(checked.figure.pose(values).positions, edges, skin):
-            yield f"{name}: {count} edges of tongue and teeth pass through the skin"
+            yield f"{name}: {count} edges of tongue, teeth and walls of the mouth pass through the skin"
 
 
 def hand_depths(body: BodyModel, joints: Float64) -> tuple[float, int]:

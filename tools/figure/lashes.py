@@ -9,10 +9,10 @@ from fba.arrays import Float64, Int64
 
 COLOUR = np.array([0.012, 0.008, 0.006])
 """Linear light."""
-UPPER = 96
+UPPER = 108
 SEGMENTS = 3
-LENGTH = 0.0070
-WIDTH = 0.00026
+LENGTH = 0.0060
+WIDTH = 0.00021
 
 
 def lashes(margin: Float64, centre: Float64) -> Mesh:
@@ -28,7 +28,7 @@ def lashes(margin: Float64, centre: Float64) -> Mesh:
     for share in np.clip(along, 0.02, 0.99):
         root = np.array([np.interp(share * run[-1], run, margin[:, axis]) for axis in range(3)])
         full = LENGTH * np.interp(share, [0.15, 0.5, 0.75, 0.96], [0.5, 0.95, 1.0, 0.62])
-        full *= 0.86 + 0.28 * random.random()
+        full *= 0.72 + 0.42 * random.random()
         blades.append(_blade(root, centre, full, share, random))
     pattern, colours = _pattern(), np.tile([*COLOUR, 0.35], (len(blades[0]), 1))
     return join([(blade, pattern, colours) for blade in blades])
@@ -50,15 +50,15 @@ def _blade(
     outward = root - centre
     outward /= np.linalg.norm(outward)
     # They fan out: inner ones lean to the nose, outer ones to the temple.
-    fan = np.array([(share - 0.42) * 0.95 + random.normal(0, 0.10), 0.0, 0.0])
+    fan = np.array([(share - 0.42) * 0.95 + random.normal(0, 0.16), 0.0, 0.0])
     start = outward * 0.92 + fan + np.array([0, -0.35, 0.40])
-    end = outward * 0.25 + fan * 1.15 + np.array([0, 0.75, 0.55])
+    end = outward * 0.25 + fan * 1.15 + np.array([0, 1.0, 0.45])
     side = np.array([1.0, 0.0, -0.25 * np.sign(outward[0])])
     side /= np.linalg.norm(side)
     place, points = root.copy(), []
     for k in range(SEGMENTS + 1):
         t = k / SEGMENTS
-        width = WIDTH * (1 - 0.6 * t)
+        width = WIDTH * (1 - 0.75 * t)
         points += [place - side * width / 2, place + side * width / 2] if k < SEGMENTS else [place]
         direction = start * (1 - t) + end * t
         place = place + direction / np.linalg.norm(direction) * length / SEGMENTS

@@ -22,7 +22,7 @@ import paint
 import sculpt
 from hair import grow, scalp
 from looks import ALEX, Looks, reshape
-from meshes import Mesh, mirror
+from meshes import Mesh, mirror, unique_edges
 from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
 from subdivide import Refined, refine
 
@@ -58,7 +58,9 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
     lips = (np.abs(x) < 0.034) & (y < -0.025) & (y > -0.098) & (z > 0.07)
     refined = refine(formed, outside & (eyes | lips | (y > 0.03)))
     marks = sculpt.refine_marks(refined, coarse)
-    vertices = sculpt.press_lips(sculpt.lay_on_eyeballs(refined.vertices, marks.eye), marks) - ORIGIN
+    edges = unique_edges(refined.triangles)
+    softened = sculpt.soften_crease(refined.vertices, marks, edges)
+    vertices = sculpt.press_lips(sculpt.lay_on_eyeballs(softened, marks.eye), marks) - ORIGIN
     return replace(refined, vertices=symmetrise(vertices)), marks
 
 
@@ -190,8 +192,12 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     gloss = 0.38 + 0.06 * oily + 0.10 * lips + 0.14 * wet + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped) + 0.16 * cropped
-    throat = smoothstep((-0.012 - z) / 0.055) * (near & (ring < 0))
-    colours[:, :3] *= 1 - throat[:, None] * (0.62, 0.75, 0.75)
+    inside = near & (ring < 0)
+    depth = np.maximum(smoothstep((-0.012 - z) / 0.055), 0.8 * smoothstep((-ring - 0.5) / 3.5)) * inside
+    colours[:, :3] *= 1 - depth[:, None] * (0.68, 0.78, 0.78)
+    colours[:, 3] *= np.where(
+        near, 0.1 + 0.9 * smoothstep(ring / sculpt.CONTACT_RING), 1.0
+    )  # no sky in there
     colours[:, :3] *= _nostrils(surface)[:, None]
     return colours
 

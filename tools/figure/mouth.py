@@ -95,8 +95,8 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = np.stack([np.full(AROUND, last), ring, np.roll(ring, -1)], axis=1)
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
-    # Teeth further back lie in the shade of the cheeks, whose light is red.
-    behind = np.array([0.76, 0.71, 0.67]) ** max(place - 2, 0)
+    # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
+    behind = np.array([0.60, 0.54, 0.50]) ** (max(place - 2, 0) ** 1.15)
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * behind
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1]])
     # Between the teeth it is darker.

@@ -23,6 +23,10 @@ HAIR_WIDTH = 0.00023
 """Metres."""
 STROKES = 190000
 """Of the head's hair."""
+BROW_STROKES = ((1600, 0.0), (700, 0.25))
+"""Of both brows: how many hairs, and how far their colour is towards that of the skin."""
+TAPER = ((1.0, 110), (0.7, 190), (0.4, 255))
+"""Shares of a brow's hair from its root, and how opaque they are, 0..255: it ends in a point."""
 BROW = np.array([
     # along the left brow: x, y, extent downwards and upwards (mm)
     (12.5, 14.5, 3.4, 3.2), (18, 17.6, 4.0, 3.6), (26, 20.8, 3.9, 3.4), (35, 23.0, 3.2, 3.0),
@@ -80,9 +84,9 @@ def brow(positions: Float64, height: float = 1.0) -> tuple[Float64, Float64]:
     middle, low, high = (np.interp(x, BROW[:, 0], BROW[:, column]) for column in (1, 2, 3))
     offset = positions[:, 1] - middle
     reach = np.where(offset < 0, low, high) * height
-    across = 1 - smoothstep((np.abs(offset) / reach - 0.35) / 0.75)
+    across = 1 - smoothstep((np.abs(offset) / reach - 0.15) / 0.95)
     along = (x - BROW[0, 0]) / (BROW[-1, 0] - BROW[0, 0])
-    ends = smoothstep((along + 0.03) / 0.14) * (1 - smoothstep((along - 0.90) / 0.12))
+    ends = smoothstep((along + 0.06) / 0.36) * (1 - smoothstep((along - 0.68) / 0.34))
     front = positions[:, 2] > -0.03
     return along, np.where(front, across * ends, 0.0)
 
@@ -102,7 +106,7 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     below = _blend(np.tile(looks.hair.colours[0], (len(p), 1)), np.array(looks.scalp), parting)
     below = below * (0.86 + 0.28 * speckle[:, None])
     colour = _blend(colour, below, 0.9 * cover)
-    colour = _blend(colour, np.array(looks.brow), 0.30 * brow(p, looks.brow_height)[1])
+    colour = _blend(colour, np.array(looks.brow), 0.22 * brow(p, looks.brow_height)[1])
     image = np.zeros((*chart.known.shape, 3))
     image[chart.known] = colour
     image = _fill_unknown(image, chart.known)
@@ -253,12 +257,14 @@ def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
         direction = _unit(way) * random.uniform(*hair.stroke, (len(chosen), 1))
         other, back = _across_the_seam(p, chosen, direction)
         drawn = np.concatenate([chosen, other]), np.concatenate([direction, back])
-        layers.append((*drawn, colour, 0.75))
+        layers.append((*drawn, colour, 0.75, ((1.0, 255),)))
     along, density = brow(p, looks.brow_height)
-    weight = area[rows, columns] * density**1.2
-    chosen = random.choice(len(p), 2600, p=weight / weight.sum())
-    layers.append((chosen, _brow_hairs(p[chosen], along[chosen], random), looks.brow, 0.80))
-    for chosen, direction, colour, strength in layers:
+    weight = area[rows, columns] * density
+    for count, pale in BROW_STROKES:
+        chosen = random.choice(len(p), count, p=weight / weight.sum())
+        colour = np.array(looks.brow) * (1 - pale) + np.array(looks.skin) * pale
+        layers.append((chosen, _brow_hairs(p[chosen], along[chosen], random), colour, 0.85, TAPER))
+    for chosen, direction, colour, strength, taper in layers:
         mask = Image.new("L", (SIZE * 2, SIZE * 2), 0)
         draw = ImageDraw.Draw(mask)
         roots = np.stack([columns[chosen], rows[chosen]], axis=1).astype(np.float64)
@@ -269,7 +275,9 @@ def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
         # Where texels are small, a hair is wide in texels.
         wide = np.clip(np.round(2 * HAIR_WIDTH / np.sqrt(area[rows[chosen], columns[chosen]])), 1, 8)
         for (x0, y0), (dx, dy), width in zip(roots[good] * 2, move[good] * 2, wide[good], strict=True):
-            draw.line((x0 - dx / 2, y0 - dy / 2, x0 + dx / 2, y0 + dy / 2), fill=255, width=int(width))
+            x, y = x0 - dx / 2, y0 - dy / 2
+            for share, fill in taper:
+                draw.line((x, y, x + dx * share, y + dy * share), fill=fill, width=int(width))
         blurred = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
         faded = blurred.point(lambda value, s=strength: int(value * s))
         picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in colour)), (0, 0), faded)
@@ -300,7 +308,8 @@ def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Floa
     middle = np.interp(np.abs(p[:, 0]), [0.012, 0.035, 0.06], [0.0148, 0.0232, 0.0135])
     angle = np.radians(angle - np.clip((p[:, 1] - middle) / 0.003, -1, 1) * 22)
     sampled = np.stack([np.cos(angle) * np.sign(p[:, 0]), np.sin(angle), np.zeros(len(p))], axis=1)
-    return sampled * random.uniform(0.0035, 0.0062, (len(p), 1))
+    ends = np.interp(along, [0.0, 0.15, 0.7, 1.0], [0.75, 1.0, 1.0, 0.6])[:, None]
+    return sampled * random.uniform(0.0040, 0.0072, (len(p), 1)) * ends
 
 
 def _in_texels(step_x: Float64, step_y: Float64, direction: Float64) -> Float64:

@@ -32,6 +32,8 @@ MOUTH = np.array([0.0, -0.0708])
 CONTACT_RING = 1
 """Ring along which the lips touch, counted from the border of the inside of the mouth."""
 
+CREASE_ROUNDS = 14
+"""Rounds of averaging with neighbours that soften the crease of the upper lids."""
 LIP_OVERLAP = 0.0009
 """Metres by which the upper lip reaches below that ring, behind it."""
 
@@ -239,6 +241,26 @@ def press_lips(vertices: Float64, marks: Marks) -> Float64:
     depth = LIP_OVERLAP * (1 - smoothstep((np.abs(vertices[:, 0]) - 0.017) / 0.007))
     vertices = vertices.copy()
     vertices[behind, 1] = np.minimum(vertices[behind, 1], MOUTH[1] - depth[behind])
+    return vertices
+
+
+def soften_crease(vertices: Float64, marks: Marks, edges: Int64) -> Float64:
+    """Return vertices of the refined head without the hood over the outer third of the upper lids.
+
+    It would stay as a sharp fold when the eyes close. edges: (E, 2) of the refined head.
+    """
+    left, _ = _both_sides(vertices)
+    upper = upper_side(left[:, 0], left[:, 1]) & (marks.eye != FAR)
+    ring = np.where(upper, marks.eye, 0.0)
+    share = smoothstep((ring - 3.5) / 1.5) * (1 - smoothstep((ring - 13.0) / 3.0))
+    share *= smoothstep((left[:, 0] - 0.035) / 0.007)
+    both = np.concatenate([edges, edges[:, ::-1]])
+    count = np.bincount(both[:, 0], minlength=len(vertices))[:, None]
+    for _ in range(CREASE_ROUNDS):
+        mean = np.stack(
+            [np.bincount(both[:, 0], axis[both[:, 1]], len(vertices)) for axis in vertices.T], axis=1
+        )
+        vertices = vertices + 0.5 * share[:, None] * (mean / np.maximum(count, 1) - vertices)
     return vertices
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -21,11 +21,25 @@ from fba_player.scene.scene import Scene
 from fba_player.view._camera import Camera, Subject
 from fba_player.view._font import label_font, shortened
 
-SHEETS = ("faps", "visemes", "expressions", "all", "review")
+SHEETS = ("faps", "visemes", "expressions", "all", "review", "proof")
 """Names of the sheets."""
-COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3, "review": 8}
-TILE = {"faps": (160, 160), "visemes": (220, 220), "expressions": (360, 360), "review": (200, 200)}
+COLUMNS = {"faps": 11, "visemes": 7, "expressions": 3, "review": 8, "proof": 8}
+TILE = {
+    "faps": (160, 160),
+    "visemes": (220, 220),
+    "expressions": (360, 360),
+    "review": (200, 200),
+    "proof": (288, 360),
+}
 """Columns, and width and height of a picture in pixels."""
+THREE_QUARTER = 38.0
+"""Degrees that the camera goes round for the second picture of a viseme or an expression."""
+VIEWS = (
+    ("front", "face", 0.0, 0.0), ("three-quarter", "face", THREE_QUARTER, 0.0),
+    ("other side", "face", -THREE_QUARTER, 0.0), ("profile", "face", 90.0, 0.0), ("back", "face", 180.0, 0.0),
+    ("from above", "face", 20.0, 35.0), ("from below", "face", 20.0, -25.0), ("near", "cheeks", 0.0, 0.0),
+)  # fmt: skip
+"""Views of a face at rest: label, see `close_up`, yaw and pitch of the camera."""
 FULL_INTENSITY = 63
 """Intensity of the expressions: the largest that a stream can carry."""
 
@@ -52,7 +66,8 @@ def contact_sheet(
 
     what: "faps", each of the 66 at a value and from a side that show it well; "visemes", the 14;
     "expressions", the 6 at full intensity; "all", one sheet below the other; "review", the rest pose, the
-    main motions, visemes and expressions, which show whether a head was imported well. model: the face, by
+    main motions, visemes and expressions, which show whether a head was imported well; "proof", eight views,
+    then expressions and visemes from two sides, to compare looks. model: the face, by
     default the built-in head. tile: width and height of one picture in pixels.
 
     Raises ValueError for another name, pictures below 16x16 or a sheet that would be too large, DisplayError
@@ -77,11 +92,15 @@ def contact_sheet(
 
 
 def tiles(kind: str, scene: Scene) -> list[Tile]:
-    """Return the pictures of a sheet: "faps", "visemes", "expressions" or "review"."""
+    """Return the pictures of a sheet: one of `SHEETS` but "all"."""
     if kind == "faps":
         return list(_fap_tiles())
     if kind == "review":
         return [*_review_tiles(), *tiles("visemes", scene), *tiles("expressions", scene)]
+    if kind == "proof":
+        both = [*tiles("expressions", scene), *tiles("visemes", scene)]
+        around = [replace(tile, yaw=yaw) for tile in both for yaw in (0.0, THREE_QUARTER)]
+        return [*(Tile(label, "", _faps(""), *view) for label, *view in VIEWS), *around]
     definitions = scene.model.definitions
     if kind == "visemes":
         rows = zip(VISEMES[1:], definitions.visemes[1:], strict=True)

@@ -21,6 +21,7 @@ TRANSLATING = [
     if fap.positive in DIRECTIONS and fap.unit not in ("", "AU") and fap.number not in (27, 28)
 ]
 ALONG_AN_ARC = {3, 19, 20, 21, 22}
+STRETCHING = (6, 7)
 LIP_PAIRS = [(f.number, f.lip_mate) for f in faps() if f.group == 2 and f.lip_mate]
 
 
@@ -105,7 +106,9 @@ def test_inner_and_outer_lip_together_go_straight(head: FaceModel, inner: int, o
     for sign in (1, -1):
         small = moved(head, {inner: 10 * sign, outer: 10 * sign})
         large = moved(head, {inner: 100 * sign, outer: 100 * sign})
-        np.testing.assert_allclose(large, 10 * small, atol=2e-5)
+        # A mouth that is drawn wide bends round the teeth.
+        axes = slice(0, 2) if sign > 0 and inner in STRETCHING else slice(0, 3)
+        np.testing.assert_allclose(large[:, axes], 10 * small[:, axes], atol=2e-5)
 
 
 def test_the_jaw_is_a_hinge_in_at_least_five_intervals(head: FaceModel) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fba
+from fba import figures
 from fba.animation import Animation, BodyTrack
 from fba.arrays import Float32
 from fba.body import BodyModel
@@ -122,11 +123,14 @@ def test_lids_follow_the_gaze_unless_they_are_closed(figure: FaceFigure) -> None
     np.testing.assert_array_equal(closed[upper], looking[upper])
 
 
-@pytest.mark.parametrize("number", [16, 17])
-def test_lips_pushed_back_stop_before_the_teeth(checked: Checked, figure: FaceFigure, number: int) -> None:
+@pytest.mark.parametrize("name", list(figures.FIGURES))
+@pytest.mark.parametrize("numbers", [(16,), (17,), (39, 40)])
+def test_lips_and_cheeks_drawn_in_stop_before_what_is_inside(name: str, numbers: tuple[int, ...]) -> None:
+    checked = Checked(figures.face(name), figures.body(name))
     edges, skin = checked.inner_edges(), checked.outer_skin()
-    for value in (-1080, -450):
-        assert pierced(figure.pose(vector({number: value})).positions, edges, skin) == 0, value
+    for value in (-1080, -450, -400, -300):
+        values = vector(dict.fromkeys(numbers, float(value)))
+        assert pierced(checked.figure.pose(values).positions, edges, skin) == 0, value
 
 
 @pytest.mark.parametrize("sample", ["hello.fap"])

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.face.authoring.regions._smile import add_smile
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion, ease_field
 from fba.face.authoring.surface._motion_limits import coupled_motions, eased_linear_motion, values_to_reach
@@ -98,7 +99,7 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             inner, outer = field * inward, field * (1 - inward)
             pair = coupled_motions(limiter, (inner, inner), (outer, outer), number)
             motions[number], motions[mate] = pair
-    return motions, lost
+    return {fap: add_smile(marks, limiter, fap, motion) for fap, motion in motions.items()}, lost
 
 
 def _missing_reason(marks: Landmarks, number: int) -> str:

@@ -1,0 +1,115 @@
+"""What a smile does beside the corners of the mouth, which its FAPs give: FAPs 6, 7, 12, 13 and 53, 54, 59, 60.
+
+Corners that are drawn apart slide back round the teeth, and the lips between grow thin. Corners that are raised
+push the cheek up into a bulge below the eye, beside which the fold from nose to mouth deepens.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fba.arrays import Float64, Intp
+from fba.face.authoring.surface._fold_limits import Limiter
+from fba.face.authoring.surface._motion import Motion
+from fba.face.authoring.surface._motion_limits import human_range, soft_limit, stop_at_folds
+from fba.face.authoring.surface.landmarks import Landmarks
+from fba.sampling import smoothstep
+
+STRETCHING = {6: 1.0, 53: 1.0, 7: -1.0, 54: -1.0}
+"""Sign of x towards which each FAP draws a corner of the mouth when positive."""
+RAISING = {12: 1.0, 59: 1.0, 13: -1.0, 60: -1.0}
+"""Side of the corner that each FAP raises."""
+KNOTS = (16.0, 110.0, 220.0)
+"""Values at which the way of a stretched corner bends: an arc, that begins straight to the side."""
+BEND = 4.0
+"""1 / radius of that arc, in 1 / ES0."""
+THINNING, IN_MIDDLE = 1.9, 0.22
+"""Share of a lip's height that goes where it is stretched by the mouth's width; and the share of the corner's
+stretch that counts all along the lip."""
+LIP_HEIGHT = 0.2
+"""Distance from the line of contact up to which the height counts, in ES0."""
+BULGE = (1.0, 0.40)
+"""How far the cheek comes out, and up, as shares of the way of a raised corner."""
+FOLD = -0.30
+"""The same of the fold beside it."""
+CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.215), ({"8.3": 0.62, "9.1": 0.38}, 0.09)
+"""Where they are: shares of feature points of the left side, and their breadth in ES0."""
+RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
+NEAR, REACH = 0.54, 0.78
+"""Distances from the corner of the mouth between which all that fades out, in ES0."""
+FOLD_OUTWARD = 0.09
+"""Distance of the fold outside of the line from nose to mouth, in ES0."""
+
+
+def add_smile(marks: Landmarks, limiter: Limiter, fap: int, motion: Motion) -> Motion:
+    """Return the motion of the corner of the mouth by a FAP with what goes along; others as they are."""
+    if fap in STRETCHING:
+        return stop_at_folds(limiter, _stretched(marks, _with_knots(motion, STRETCHING[fap])))
+    if fap in RAISING:
+        return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], outer=fap > 50))
+    return motion
+
+
+def _with_knots(motion: Motion, sign: float) -> Motion:
+    """Return the same motion with `KNOTS` among its values, on the side on which it stretches."""
+    values = np.union1d(motion.values, [k for k in KNOTS if k < motion.values[-1]])
+    return Motion(values, motion.vertices, np.stack([motion.shifts_at(value) for value in values]))
+
+
+def _stretched(marks: Landmarks, motion: Motion) -> Motion:
+    """Return a stretch along an arc, of lips that grow thinner."""
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    near = surface.distances(np.flatnonzero(marks.lips | marks.on_inner_lips), 0.2 * es)
+    motion = _including(motion, np.flatnonzero((near < 0.2 * es) & ~marks.inside_mouth))
+    places = surface.vertices[motion.vertices]
+    on_lip = np.exp(-((np.minimum(near[motion.vertices], es) / (0.08 * es)) ** 2))
+    middle, corner = marks.point_or_average("2.2"), marks.point_or_average("8.3")
+    sideways = np.clip((places[:, 0] - middle[0]) / (corner[0] - middle[0]), -1.0, 1.0) ** 2
+    line = middle[1] + (corner[1] - middle[1]) * sideways
+    height = np.clip(places[:, 1] - line, -LIP_HEIGHT * es, LIP_HEIGHT * es)
+    width = marks.fapu.MW * 1024
+    shifts = motion.shifts.copy()
+    apart = np.abs(motion.shifts[..., 0]) * (motion.values > 0)[:, None]
+    shifts[..., 2] -= 0.5 * apart**2 * BEND / es
+    thin = apart + IN_MIDDLE * np.maximum(_ways(motion.values, 6) * marks.fapu.MW, 0.0)[:, None]
+    shifts[..., 1] -= thin / width * THINNING * height * on_lip
+    return Motion(motion.values, motion.vertices, shifts)
+
+
+def _with_cheek(marks: Landmarks, motion: Motion, side: float, *, outer: bool) -> Motion:
+    """Return a raised corner with the cheek's bulge, of which the outer contour's FAP has the most."""
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    share = 0.8 if outer else 0.2
+    corner = marks.point_or_average("8.3" if side > 0 else "8.4")
+    away = np.linalg.norm(surface.vertices - corner, axis=1) / es
+    near = smoothstep((REACH - away) / (REACH - NEAR)) * ~(marks.inside_mouth | marks.lips)
+    field = np.zeros((len(surface), 3))
+    for (points, breadth), (out, up), beside in (
+        (CHEEK, BULGE, 0.0),
+        (FOLD_PLACE, (FOLD, 0.0), FOLD_OUTWARD),
+    ):
+        names = {name if side > 0 else RIGHT[name]: part for name, part in points.items()}
+        centre = np.sum([part * marks.point_or_average(name) for name, part in names.items()], axis=0)
+        centre[0] += side * beside * es
+        distance = np.linalg.norm(surface.vertices - centre, axis=1)
+        weight = near * np.exp(-((distance / (breadth * es)) ** 2))
+        field += weight[:, None] * (out * surface.normals + (0.0, up, 0.0))
+    field *= share
+    motion = _including(motion, np.flatnonzero(field.any(axis=1)))
+    raised = _ways(motion.values, 12) * marks.fapu.MNS
+    shifts = motion.shifts + raised[:, None, None] * field[motion.vertices]
+    return Motion(motion.values, motion.vertices, shifts)
+
+
+def _ways(values: Float64, fap: int) -> Float64:
+    """Return the values (K,) of a FAP, slowed where human faces end."""
+    most = human_range(fap)
+    return np.array([soft_limit(value, most[int(value > 0)]) for value in values])
+
+
+def _including(motion: Motion, more: Intp) -> Motion:
+    """Return the same motion with further vertices, which stay where they are."""
+    vertices = np.union1d(motion.vertices, more)
+    shifts = np.zeros((len(motion.values), len(vertices), 3))
+    shifts[:, np.searchsorted(vertices, motion.vertices)] = motion.shifts
+    return Motion(motion.values, vertices, shifts)
