@@ -1,7 +1,7 @@
 """How well points are found on other heads: python -m tools.photos.measure_points SHARED [HEAD.glb...]
 
-SHARED: the folder of shared data. Further heads are files of faces; where the points of their brows are, a
-file with the head's name and the ending .brows.csv beside them says, like brows.csv.
+SHARED: the folder of shared data. Further heads are files of faces; where points were placed by hand, a
+file with the head's name and the ending .points.csv beside them says, like placed.csv.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fba.arrays import Float64
 from fba.errors import FbaWarning, ModelError
 from fba.face import FaceModel
 from fba.face.fitting import FRONT_POINTS, FoundPoints, find_front_points
-from tools.photos.other_heads import Picture, other_heads, pictures, with_brows
+from tools.photos.other_heads import Picture, other_heads, pictures, with_placed
 
 GROUPS = {
     "pupils": ("3.5", "3.6"),
@@ -63,7 +63,7 @@ def group_errors(off: Float64) -> dict[str, float]:
 def main(shared: str, *more: str) -> None:
     heads = other_heads(Path(shared))
     for path in map(Path, more):
-        heads[path.stem] = with_brows(FaceModel.load(path), path.stem, path.with_suffix(".brows.csv"))
+        heads[path.stem] = with_placed(FaceModel.load(path), path.stem, path.with_suffix(".points.csv"))
     shown = (one for k, (name, head) in enumerate(heads.items()) for one in pictures(name, head, k + 1))
     off = measure(shown)
     print(f"{'':18}" + " ".join(f"{name[-9:]:>9}" for name in [*GROUPS, "all"]) + "   not found")

@@ -28,8 +28,8 @@ SHARED = {
 """Heads of the shared folder, by name."""
 BROWS = ("4.1", "4.2", "4.3", "4.4", "4.5", "4.6")
 DISTANCE = 1.5
-TABLE = Path(__file__).with_name("brows.csv")
-"""Points of brows, metres in the axes of the imported head, read from rendered pictures of it."""
+TABLE = Path(__file__).with_name("placed.csv")
+"""Points placed by hand on large rendered pictures of imported heads: metres in the axes of these."""
 LIGHTS = (0.0, -60.0, 60.0, 25.0, -25.0)
 """Degrees beside the camera from which the light comes, by picture."""
 
@@ -53,13 +53,13 @@ def other_heads(shared: Path, names: Iterable[str] = tuple(SHARED)) -> dict[str,
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
         heads = {n: import_model(shared / SHARED[n]) for n in names if (shared / SHARED[n]).exists()}
-    return {name: with_brows(head, name) for name, head in heads.items()}
+    return {name: with_placed(head, name) for name, head in heads.items()}
 
 
-def with_brows(head: FaceModel, name: str, table: Path = TABLE) -> FaceModel:
-    """Return a head whose points of the brows are where they were placed by hand: NaN if nowhere.
+def with_placed(head: FaceModel, name: str, table: Path = TABLE) -> FaceModel:
+    """Return a head whose points are where they were placed by hand; those of the brows NaN if nowhere.
 
-    Importers guess these from the bones, not from the picture.
+    Importers guess these from the bones, not from what the picture shows: brows, the outline of the lips.
     """
     points, bound, row = head.points.copy(), head.bound.copy(), point_rows()
     rows = [row[one] for one in BROWS]
@@ -68,6 +68,7 @@ def with_brows(head: FaceModel, name: str, table: Path = TABLE) -> FaceModel:
         for line in csv.DictReader(file):
             if line["head"] == name:
                 points[row[line["point"]]] = [float(line[axis]) for axis in "xyz"]
+                bound[row[line["point"]]] = -1
     return replace(head, points=points, bound=bound)
 
 
