@@ -5,8 +5,8 @@ python -m tools.figure_checks [--figure NAME] [--only mouth|lids|inside|hands]..
 mouth: pictures of the person, 360, 720 and 1080 lines high, show neither background nor the inside of the
 mouth between lips that a stream closes. lids: closed lids meet within 0.2 mm. inside: tongue and teeth pass
 through no skin, over all FAPs in steps, lips closed and open, and over frames of the streams. hands: are
-outside the thighs. Without files, the samples and the shared recordings (FBA_SHARED, else ../shared beside
-the checkout) are taken, for hands the samples. It prints each finding, and ends with 1 where there is one.
+shown outside the thighs. Without files, the samples and the shared recordings (FBA_SHARED, else ../shared
+beside the checkout) are taken. It prints each finding, and ends with 1 where there is one.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ WIDEST = 0.24
 """Largest radius of a part, metres: wide robes do not keep hands away."""
 ARM_SHARE = 0.3
 """Weight of the arm from which a vertex does not belong to the trunk."""
-HAND_POINTS, FOREARM_POINTS = 40, 10
+HAND_POINTS, FOREARM_POINTS = 80, 10
 """Points of each arm that are kept outside."""
 FOREARM = 0.3
 """Share of the forearm, from the elbow, that is not looked at."""
