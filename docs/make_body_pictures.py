@@ -13,6 +13,7 @@ from PIL import Image
 
 import fba
 from fba import Animation, BodyTrack, player
+from fba.body import gait
 from fba.parameters import baps
 
 SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[2] / "shared")
@@ -24,6 +25,7 @@ CLIPS = (
 )
 """Clip, the camera's yaw, and the moments shown, as shares of the clip."""
 SIZE = (240, 340)
+LINES = (360, 720, 1080)
 POSTURES = (
     ({"?_shoulder_abduct": 165}, 20.0, (0.0, 1.45, 0.0), 2.1),
     ({"?_shoulder_flexion": 90, "?_elbow_flexion": 30}, 140.0, (0.0, 1.25, 0.1), 2.1),
@@ -41,6 +43,27 @@ POSTURES = (
 TWISTS = ({}, {"l_elbow_twisting": 90}, {"l_elbow_twisting": -150}, {"l_wrist_twisting": 90},
           {"l_wrist_twisting": -150})  # fmt: skip
 """Degrees of BAPs by name."""
+
+
+def bodies() -> Image.Image:
+    """Somebody dancing, walking and sitting, at 360 lines, and a part of each at 720 and at 1080 lines."""
+    dance, walk = fba.read(SHARED / "data" / "greta/Dance.bvh"), gait.walk(cycles=1, in_place=True)
+    rows = ((dance, 660, 25.0), (walk, 4, 60.0), (_posed([POSTURES[4][0]]), 0, 50.0))
+    wide, high = SIZE[0], LINES[0]
+    sheet = Image.new("RGB", (wide * len(LINES), high * len(rows)))
+    for row, (animation, frame, yaw) in enumerate(rows):
+        scene = player.Scene(animation)
+        time = float(scene.start) + frame / float(animation.rate)
+        places = np.concatenate([mesh.positions for mesh in scene.view_at(time).faces])
+        middle = (places.min(axis=0) + places.max(axis=0)) / 2 - np.array(scene.travel(time))
+        x, y, z = middle.tolist()
+        camera = player.Camera((x, y, z), yaw=yaw, pitch=6.0, distance=4.3)
+        for column, lines in enumerate(LINES):
+            with player.Offscreen(scene, (lines * wide // high, lines), camera, samples=4) as view:
+                picture = Image.fromarray(view.frame(time)).convert("RGB")
+            left, top = (picture.width - wide) // 2, (picture.height - high) // 2
+            sheet.paste(picture.crop((left, top, left + wide, top + high)), (column * wide, row * high))
+    return sheet
 
 
 def clips() -> Image.Image:
@@ -63,17 +86,7 @@ def clips() -> Image.Image:
 
 def postures() -> Image.Image:
     """Raised arms, bent elbows, the head thrown back, sitting, squatting, striding, bowing."""
-    number = {bap.name: bap.number for bap in baps()}
-    values = np.zeros((len(POSTURES), 296), dtype=np.int32)
-    for frame, (degrees, *_) in enumerate(POSTURES):
-        for name, angle in degrees.items():
-            for side in "lr" if name.startswith("?") else " ":
-                # limbs of the right side open to the other side
-                sign = -1 if side == "r" and name.endswith("_abduct") else 1
-                values[frame, number[name.replace("?", side)] - 1] = round(np.radians(sign * angle) * 1e5)
-    scene = player.Scene(
-        Animation(1, np.arange(len(values)), body=BodyTrack(values, np.ones(values.shape, dtype=bool)))
-    )
+    scene = player.Scene(_posed([degrees for degrees, *_ in POSTURES]))
     sheet = Image.new("RGB", (SIZE[0] * 4, SIZE[1] * 2))
     with player.Offscreen(scene, SIZE, samples=4) as view:
         for frame, (_, yaw, target, distance) in enumerate(POSTURES):
@@ -81,6 +94,19 @@ def postures() -> Image.Image:
             picture = Image.fromarray(view.frame(float(frame))).convert("RGB")
             sheet.paste(picture, (frame % 4 * SIZE[0], frame // 4 * SIZE[1]))
     return sheet
+
+
+def _posed(postures: list[dict[str, int]]) -> Animation:
+    """An animation of a frame for each posture, degrees of BAPs by name."""
+    number = {bap.name: bap.number for bap in baps()}
+    values = np.zeros((len(postures), 296), dtype=np.int32)
+    for frame, degrees in enumerate(postures):
+        for name, angle in degrees.items():
+            for side in "lr" if name.startswith("?") else " ":
+                # limbs of the right side open to the other side
+                sign = -1 if side == "r" and name.endswith("_abduct") else 1
+                values[frame, number[name.replace("?", side)] - 1] = round(np.radians(sign * angle) * 1e5)
+    return Animation(1, np.arange(len(values)), body=BodyTrack(values, np.ones(values.shape, dtype=bool)))
 
 
 def twists() -> Image.Image:

@@ -27,6 +27,7 @@ PICTURES = {
     "capture-markers.jpg": "make_marker_capture_picture.main",
     "capture-points.jpg": "make_points_picture.main",
     "capture-report.jpg": "make_capture_picture.main",
+    "bodies.jpg": "make_body_pictures.bodies",
     "clips.jpg": "make_body_pictures.clips",
     "compare.jpg": "make_player_pictures.compare",
     "dance.jpg": "make_recording_pictures.dance_sheet",

@@ -41,19 +41,19 @@ WIDEST = 0.24
 """Largest radius of a part, metres: wide robes do not keep hands away."""
 ARM_SHARE = 0.3
 """Weight of the arm from which a vertex does not belong to the trunk."""
-HAND_POINTS, FOREARM_POINTS = 40, 10
+HAND_POINTS, FOREARM_POINTS = 80, 10
 """Points of each arm that are kept outside."""
 FOREARM = 0.3
 """Share of the forearm, from the elbow, that is not looked at."""
-MARGIN = 0.004
+MARGIN = 0.008
 """Metres that these points keep from the body."""
-STEPS = 16
+STEPS = 24
 """Steps of the correction."""
-DAMPING = (0.25, 0.3)
+DAMPING = (0.5, 0.6)
 """Metres: damping of the turns of shoulder and wrist."""
 LARGEST = (0.10, 0.05)
 """Radians: largest turn of shoulder and wrist in a step."""
-OUTWARDS = (0.35, 0.6)
+OUTWARDS = (0.6, 0.6)
 """How much points are pushed to their arm's side, and ahead, besides away from the middle of what they are
 in: one on the far side of that middle comes out where arms come from, without a jump."""
 
@@ -239,12 +239,12 @@ def _depth(
     a, b, c = place[0] - m[j, 0, 3], place[1] - m[j, 1, 3], place[2] - m[j, 2, 3]
     y = m[j, 0, 1] * a + m[j, 1, 1] * b + m[j, 2, 1] * c
     low, high = parts.ends[part, 0], parts.ends[part, 1]
-    if y < low - FADE or y > high + FADE:
+    if not (low - FADE <= y <= high + FADE):  # written so that NaN is outside
         return -1.0, 0.0, 0.0, 0.0
     x = m[j, 0, 0] * a + m[j, 1, 0] * b + m[j, 2, 0] * c - parts.middles[part, 0]
     z = m[j, 0, 2] * a + m[j, 1, 2] * b + m[j, 2, 2] * c - parts.middles[part, 1]
     away = np.sqrt(x * x + z * z)
-    if away > parts.widest[part] + MARGIN:
+    if not away <= parts.widest[part] + MARGIN:
         return -1.0, 0.0, 0.0, 0.0
     t = min(max((low - y) / FADE, (y - high) / FADE, 0.0), 1.0)
     fade = 1.0 - t * t * (3.0 - 2.0 * t)
@@ -333,7 +333,7 @@ def _solve(normal: Float64, wanted: Float64) -> None:
 
 @inlined
 def _turn(matrices: Float64, joints: Int64, turn: Float64, largest: float, turns: Float64) -> None:
-    """Turn joints about the first of them, in place, by a vector (3,) that is shortened to at most largest."""
+    """Turn joints about the first of them, in place, by a vector (3,), shortened to at most largest."""
     size = np.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
     if size < 1e-12:
         return

@@ -53,7 +53,7 @@ ARMPIT = (0.155, 1.315)
 FOLD = 0.003
 """Metres by which an edge is folded in below the skin."""
 HEMMED, STITCHED = 0.0016, 0.0007
-"""Metres by which cloth stands out where it is doubled along an edge, and by which the stitches there draw it in."""
+"""Metres by which cloth stands out where it is doubled along an edge, and by which stitches draw it in."""
 ROUNDED = ((0.0012, -0.0003), (0.0021, -0.0014), (0.0020, -0.0028))
 """Rows that round an edge: metres beyond it, and outwards."""
 

@@ -37,7 +37,7 @@ GLOSS = 0.38
 DARKEST = 0.55
 """Brightness of a colour where no light of the sky falls."""
 NAIL = (0.52, 0.60)
-"""Share of a finger's last bone, from its joint, and of a normal that points outwards, from which a nail is."""
+"""Share of a finger's last bone from its joint, and of a normal outwards, from which a nail is."""
 NAIL_COLOUR = (1.16, 1.12, 1.14, 2.0)
 """Factors of the complexion and of its gloss on nails."""
 UNDER = 0.02

@@ -251,7 +251,9 @@ class Scene(Timed[Timeline]):
 
     def _joints(self, baps: Float64) -> Float64:
         """Return joint matrices (J, 4, 4) for BAPs (296,); as points they are shown as the BAPs say."""
-        return self._poser.plain.pose(baps) if self._view == "points" else self._poser.pose(baps, self.switches)
+        return (
+            self._poser.plain.pose(baps) if self._view == "points" else self._poser.pose(baps, self.switches)
+        )
 
     def _face_matrix(self, joints: Float64 | None) -> Float64:
         """Return (4, 4): from the face model's frame into the world, without the head's own turn."""
