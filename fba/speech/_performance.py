@@ -38,19 +38,23 @@ def perform(
     style: float = 0.5,
     life: float = 0.5,
     prosody: Prosody | None = None,
+    motion: Animation | None = None,
 ) -> Animation:
     """Return the animation of a face that speaks; players move it linearly between its frames.
 
     rate: frames in a second that can be sent. coding: visemes (FAP 1), or faps: low-level FAPs with
     coarticulation. style: from 0, mumbled, by 0.5 to 1, overarticulated; lips close in any style. life: 0 for
-    the mouth alone, to 1: nods, brows, blinks and glances. prosody: of the sound, if there is one.
+    the mouth alone, to 1: nods, brows, blinks and glances. prosody: of the sound, if there is one. motion: of
+    a face that speaks already, at this rate; it is kept, and the rest is added to what it leaves still.
 
     Raises OptionError for numbers outside of 0 to 1.
     """
     check_share("style", style)
     check_share("life", life)
     shapes = find_shapes(speech.phones)
-    motion = find_life(speech, rate, life, prosody)
+    added = find_life(speech, rate, life, prosody)
+    if motion is not None and coding == "faps":
+        return replace(motion, face=_with_life(_styled(motion, style), added, motion.index), body=None)
     keys = find_keys(shapes, rate)
     last = max(round(speech.seconds * rate), 1)
     if not keys or keys[0][0] > 0:
@@ -58,10 +62,17 @@ def perform(
     keys = [key for key in keys if key[0] <= last]
     if keys[-1][0] < last:
         keys.append((last, keys[-1][1]))
-    frames = {frame for frame, _ in keys} | {frame for frame in motion.frames if frame <= last}
+    frames = {frame for frame, _ in keys} | {frame for frame in added.frames if frame <= last}
     index = np.array(sorted(frames), dtype=np.int64)
     face = _as_visemes(keys, index, style) if coding == "visemes" else _as_faps(shapes, index, rate, style)
-    return Animation(face=_with_life(face, motion, index), body=None, rate=rate, index=index)
+    return Animation(face=_with_life(face, added, index), body=None, rate=rate, index=index)
+
+
+def _styled(motion: Animation, style: float) -> FaceTrack:
+    if motion.face is None:
+        raise OptionError("the motion is that of a body; give one of a face")
+    values = np.rint(motion.face.values * find_style(style).gains).astype(np.int32)
+    return replace(motion.face, values=values)
 
 
 def check_share(name: str, value: float) -> None:
@@ -123,11 +134,13 @@ def with_outer_lips(face: FaceTrack) -> FaceTrack:
     return FaceTrack(values, mask)
 
 
-def _with_life(face: FaceTrack, motion: Life, index: Int64) -> FaceTrack:
-    if not motion.keys:
+def _with_life(face: FaceTrack, added: Life, index: Int64) -> FaceTrack:
+    """Return a face that does more. FAPs that move already stay as they are."""
+    if not added.keys:
         return face
     values, mask = face.values.copy(), face.mask.copy()
-    moved: Float64 = motion.values(index)
-    values[:, motion.faps] += np.rint(moved[:, motion.faps]).astype(np.int32)
-    mask[:, motion.faps] = True
+    still = added.faps[~values[:, added.faps].any(axis=0)]
+    moved: Float64 = added.values(index)
+    values[:, still] = np.rint(moved[:, still]).astype(np.int32)
+    mask[:, still] = True
     return FaceTrack(values, mask, viseme=face.viseme)
