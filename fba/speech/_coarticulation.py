@@ -52,6 +52,11 @@ class Style:
             if not 0 <= gain <= 2:
                 raise OptionError(f"style: the gain of {name} must lie in 0..2, not {gain}")
 
+    @property
+    def gains(self) -> Float64:
+        """Of each FAP (68,)."""
+        return np.where(_columns("rounding"), self.lips, np.where(_columns("jaw"), self.jaw, 1.0))
+
 
 def find_style(clarity: float) -> Style:
     """Return the style of a clarity from 0, mumbled, by 0.5, normal, to 1, overarticulated."""
@@ -85,7 +90,7 @@ def coarticulate(
     moved = table.any(axis=0)
     values = _blend(shapes, rate, count, table)
     _close(values, shapes, rate, table)
-    result = np.where(_columns("rounding"), style.lips, np.where(_columns("jaw"), style.jaw, 1.0)) * values
+    result = style.gains * values
     closed = _closures(shapes, rate, count)
     result = result + (values - result) * closed[:, None]
     mask = np.zeros((count, FAP_COUNT), dtype=bool)

@@ -50,12 +50,14 @@ def perform(
     life: float = 0.5,
     prosody: Prosody | None = None,
     keep_goal: bool = True,
+    motion: Animation | None = None,
 ) -> Animation:
     """Return the animation of a face that speaks; players move it linearly between its frames.
 
     rate: frames in a second that can be sent. coding: visemes (FAP 1), or faps: low-level FAPs with
     coarticulation. style: from 0, mumbled, by 0.5 to 1, overarticulated; lips close in any style. life: 0 for
-    the mouth alone, to 1: nods, brows, blinks and glances. prosody: of the sound, if there is one.
+    the mouth alone, to 1: nods, brows, blinks and glances. prosody: of the sound, if there is one. motion: of
+    a face that speaks already, at this rate; it is kept, and the rest is added to what it leaves still.
 
     keep_goal: leave out small movements, and up to 40 % of the sounds, those that are missed least, where the
     mouth takes more than 200 bits a second as visemes, or 500 as low-level FAPs, as in short sentences.
@@ -65,7 +67,9 @@ def perform(
     check_share("style", style)
     check_share("life", life)
     shapes = find_shapes(speech.phones)
-    motion = find_life(speech, rate, life, prosody)
+    added = find_life(speech, rate, life, prosody)
+    if motion is not None and coding == "faps":
+        return replace(motion, face=_with_life(_styled(motion, style), added, motion.index), body=None)
     keys = find_keys(shapes, rate)
     last = max(round(speech.seconds * rate), 1)
     if not keys or keys[0][0] > 0:
@@ -76,9 +80,9 @@ def perform(
     mouth = _Mouth(shapes, keys, rate, coding, style)
     if keep_goal:
         mouth = _within_goal(mouth, GOALS[coding] * speech.seconds)
-    frames = {frame for frame, _ in mouth.keys} | {frame for frame in motion.frames if frame <= last}
+    frames = {frame for frame, _ in mouth.keys} | {frame for frame in added.frames if frame <= last}
     index = np.array(sorted(frames), dtype=np.int64)
-    return Animation(face=_with_life(mouth.face(index), motion, index), body=None, rate=rate, index=index)
+    return Animation(face=_with_life(mouth.face(index), added, index), body=None, rate=rate, index=index)
 
 
 @dataclass(frozen=True)
@@ -140,6 +144,13 @@ def _within_goal(mouth: _Mouth, most: float) -> _Mouth:
     return mouth.without(order[:many])
 
 
+def _styled(motion: Animation, style: float) -> FaceTrack:
+    if motion.face is None:
+        raise OptionError("the motion is that of a body; give one of a face")
+    values = np.rint(motion.face.values * find_style(style).gains).astype(np.int32)
+    return replace(motion.face, values=values)
+
+
 def check_share(name: str, value: float) -> None:
     """Raise OptionError for a number outside of 0 to 1."""
     if not 0 <= value <= 1:
@@ -199,11 +210,13 @@ def with_outer_lips(face: FaceTrack) -> FaceTrack:
     return FaceTrack(values, mask)
 
 
-def _with_life(face: FaceTrack, motion: Life, index: Int64) -> FaceTrack:
-    if not motion.keys:
+def _with_life(face: FaceTrack, added: Life, index: Int64) -> FaceTrack:
+    """Return a face that does more. FAPs that move already stay as they are."""
+    if not added.keys:
         return face
     values, mask = face.values.copy(), face.mask.copy()
-    moved: Float64 = motion.values(index)
-    values[:, motion.faps] += np.rint(moved[:, motion.faps]).astype(np.int32)
-    mask[:, motion.faps] = True
+    still = added.faps[~values[:, added.faps].any(axis=0)]
+    moved: Float64 = added.values(index)
+    values[:, still] = np.rint(moved[:, still]).astype(np.int32)
+    mask[:, still] = True
     return FaceTrack(values, mask, viseme=face.viseme)
