@@ -127,7 +127,7 @@ class Checked:
         return np.asarray(triangles[near & ~self.of_model(red)[triangles].any(axis=1)])
 
     def inner_edges(self) -> Intp:
-        """Return (E, 2): edges of tongue, teeth and walls of the mouth, vertices counted through the model."""
+        """Return (E, 2): edges of tongue, teeth and walls of the mouth, by vertices of the model."""
         skin = self.model.part("skin").triangles.astype(np.intp) + self.model.starts["skin"]
         corners = np.sort(skin[self.walls()[skin].all(axis=1)][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         found = [np.unique(corners, axis=0)]

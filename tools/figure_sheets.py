@@ -2,9 +2,9 @@
 
 python -m tools.figure_sheets [--figure NAME] [--lines 360 720 1080] [--only face|body] FOLDER
 
-face: eight views, the expressions and the visemes from two sides. body: dance, walk and sit, eight frames each,
-of the shared recordings (FBA_SHARED, else ../shared beside the checkout). Each picture has so many lines; the
-sheets are JPEG files in FOLDER, named by content and lines.
+face: eight views, the expressions and the visemes from two sides. body: dance, walk and sit, eight frames
+each, of the shared recordings (FBA_SHARED, else ../shared beside the checkout). Each picture has so many
+lines; the sheets are JPEG files in FOLDER, named by content and lines.
 """
 
 from __future__ import annotations

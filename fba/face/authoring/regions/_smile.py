@@ -1,7 +1,7 @@
-"""What a smile does beside the corners of the mouth, which its FAPs give: FAPs 6, 7, 12, 13 and 53, 54, 59, 60.
+"""What a smile does beside moving the corners of the mouth: FAPs 6, 7, 12, 13 and 53, 54, 59, 60.
 
-Corners that are drawn apart slide back round the teeth, and the lips between grow thin. Corners that are raised
-push the cheek up into a bulge below the eye, beside which the fold from nose to mouth deepens.
+Corners that are drawn apart slide back round the teeth, and the lips between grow thin. Corners that are
+raised push the cheek up into a bulge below the eye, beside which the fold from nose to mouth deepens.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ STRETCHING = {6: 1.0, 53: 1.0, 7: -1.0, 54: -1.0}
 """Sign of x towards which each FAP draws a corner of the mouth when positive."""
 RAISING = {12: 1.0, 59: 1.0, 13: -1.0, 60: -1.0}
 """Side of the corner that each FAP raises."""
-KNOTS = (16.0, 110.0, 220.0)
+KNOTS = (16.0, 150.0)
 """Values at which the way of a stretched corner bends: an arc, that begins straight to the side."""
 BEND = 4.0
 """1 / radius of that arc, in 1 / ES0."""
