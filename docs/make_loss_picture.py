@@ -12,7 +12,7 @@ matplotlib.use("svg")
 
 from matplotlib import pyplot
 
-from bench import loss
+from bench.codec import loss
 
 TARGET = Path(__file__).with_name("images") / "loss.svg"
 SHARES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
