@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bench.speech import add_noise, start_errors, telephone, visemes
-from bench.spoken import FLITE, KNOWN, VOICES, speak
+from bench.speech.spoken import FLITE, KNOWN, VOICES, speak
 from fba.arrays import Int16
 from fba.audio import read_mono
 from fba.errors import FormatError, UnsupportedError
@@ -36,7 +36,7 @@ def spoken(voice: str, text: str, folder: Path) -> tuple[Int16, list[Phone]]:
 @needs_recogniser
 @needs_flite
 def test_phones_are_found_where_they_are_spoken(tmp_path: Path) -> None:
-    """The first sentences of `bench.spoken`, each of another voice; its table has all of them."""
+    """The first sentences of `bench.speech.spoken`, each of another voice; its table has all of them."""
     starts, with_text, without = [], [], []
     voices = VOICES if shutil.which("espeak-ng") else FLITE
     for voice, text in zip(voices, KNOWN, strict=False):

@@ -12,9 +12,9 @@ matplotlib.use("svg")
 
 from matplotlib import pyplot
 
-from bench import loss
+from bench.codec import loss
 
-TARGET = Path(__file__).with_name("images") / "loss.svg"
+TARGET = Path(__file__).parents[1] / "images" / "loss.svg"
 SHARES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 SECONDS = 6.5
 SETTINGS = [

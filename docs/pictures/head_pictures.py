@@ -17,7 +17,7 @@ from fba.formats import merge
 
 UInt8 = npt.NDArray[np.uint8]
 
-PAGE = Path(__file__).with_name("calibrate.md")
+PAGE = Path(__file__).parents[1] / "calibrate.md"
 SAMPLES = Path(fba.__file__).with_name("samples")
 MOMENTS = (1.9, 2.6, 4.4, 6.6)
 """Seconds of the sample performance that the first picture shows."""

@@ -1,6 +1,6 @@
 """Speed and memory of the codec.
 
-The textbook coder of `bench.linear` and ours code the same symbols in the same run, compiled the
+The textbook coder of `bench.codec.linear` and ours code the same symbols in the same run, compiled the
 same way: the ratio is what to quote.
 """
 
@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 import fba
-from bench import linear
+from bench.codec import linear
 from fba import Animation
 from fba.codec import FrameRate, PartSettings, PlaneSettings, RangeLists, encode_planes
 from fba.codec._plane.arithmetic import ALPHABET_MAX, STRIDE, Counts, decode_segment, encode_segment, learn
@@ -159,7 +159,7 @@ def test_decode_in_javascript(
     animation, bap_steps, source = head_motion
     file = tmp_path / "wide.fba"
     file.write_bytes(wide)
-    program = Path(__file__).parents[1] / "tools" / "web" / "measure.mjs"
+    program = Path(__file__).parents[2] / "tools" / "web" / "measure.mjs"
 
     def run() -> float:
         command = ["node", program, file, bap_steps, str(ROUNDS)]

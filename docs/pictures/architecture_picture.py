@@ -10,12 +10,12 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).parents[1]
 sys.path.insert(0, str(DOCS.parent / "tests"))
 
 from test_architecture import imports, is_facade, modules, reachable  # noqa: E402  # from tests/
 
-WIDTH, ROW, BOX, GAP = 640, 84, (138, 46), 14
+WIDTH, ROW, BOX, GAP = 880, 84, (114, 46), 8
 COLOURS = {"fba": "#dbe9ff", "fba_player": "#ffe8c9", "fba_conformance": "#dff3dc"}
 ABOVE = "fba.face.fitting"  # within a room, but above others that the room itself lies below
 CORE = "fba"  # the modules that lie in no room: animation, tracks, errors, compiled ...
@@ -100,7 +100,7 @@ def draw() -> str:
         files[room(module)] += path.name != "__init__.py"
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" '
-        'font-family="sans-serif" font-size="13">',
+        'font-family="sans-serif" font-size="12">',
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" '
         'orient="auto"><path d="M0 0L8 4L0 8z" fill="#788"/></marker></defs>',
         f'<rect width="{WIDTH}" height="{height}" fill="#fff"/>',
@@ -122,7 +122,7 @@ def draw() -> str:
             f'<rect x="{left:.0f}" y="{upper:.0f}" width="{BOX[0]}" height="{BOX[1]}" rx="6" '
             f'fill="{colour}" stroke="#567"/>',
             f'<text x="{x:.0f}" y="{y - 3:.0f}" text-anchor="middle" font-weight="bold" '
-            f'font-size="{11 if len(label) > 17 else 13}">{label}</text>',
+            f'font-size="{10 if len(label) > 17 else 12}">{label}</text>',
             f'<text x="{x:.0f}" y="{y + 14:.0f}" text-anchor="middle" fill="#456" '
             f'font-size="11">{count}</text>',
         ]

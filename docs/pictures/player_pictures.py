@@ -10,7 +10,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from make_marker_picture import edit
 
 import fba
 from fba.animation import Animation
@@ -30,6 +29,7 @@ from fba_player.session._puppet import Expression
 from fba_player.session._session import Session
 from fba_player.session._source import Source
 from fba_player.sound._peaks import Peaks
+from pictures.marker_picture import edit
 from tools.window_picture import SETTLES, Studio, picture
 
 SAMPLES = Path(fba.__file__).resolve().with_name("samples")

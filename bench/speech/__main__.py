@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.spoken import FLITE, KNOWN, OTHERS, VOICES, Spoken, say
+from bench.speech.spoken import FLITE, KNOWN, OTHERS, VOICES, Spoken, say
 from fba.animation import Animation
 from fba.arrays import Array, Float64, Int16, Int64
 from fba.codec import decode

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from make_body_pictures import SHARED
-
 import fba
 from fba import player
 from fba.arrays import UInt8
 from fba_player.export.film_sheet import film_sheet
+from pictures.body_pictures import SHARED
 
 
 def expressions_sheet() -> UInt8:

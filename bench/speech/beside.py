@@ -1,4 +1,4 @@
-"""Speech as other programs find it, beside `fba.speech`: `python -m bench.speech_beside`, one table.
+"""Speech as other programs find it, beside `fba.speech`: `python -m bench.speech.beside`, one table.
 
 The same sentences, the same sound, and the shapes of each other program in turn: true phones become the
 shapes that its own rules allow for them, and so do the phones of `fba.speech`. Wanted are
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.spoken import OTHERS, VOICES, Spoken, say
+from bench.speech.spoken import OTHERS, VOICES, Spoken, say
 from fba.errors import FbaWarning
 from fba.speech import RATE, Phone, find_speech, split_text
 

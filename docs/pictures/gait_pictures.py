@@ -11,7 +11,7 @@ from fba import player
 from fba.body import gait
 from fba_player.view._camera import Camera
 
-TARGET = Path(__file__).with_name("images") / "gait.jpg"
+TARGET = Path(__file__).parents[1] / "images" / "gait.jpg"
 PHASES = 8
 SIZE = (160, 270)
 CAMERA = Camera(target=(0.0, 0.87, 0.03), yaw=78.0, pitch=2.0, distance=5.2)

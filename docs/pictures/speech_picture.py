@@ -10,7 +10,6 @@ from typing import Any
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
-from make_head_pictures import SAMPLES, UInt8
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import ConnectionPatch, FancyBboxPatch
@@ -18,6 +17,7 @@ from matplotlib.patches import ConnectionPatch, FancyBboxPatch
 from fba import player
 from fba.audio import read_mono
 from fba.speech import RATE, Phone, Shape, Speech, Word, find_shapes, find_speech, perform, split_text
+from pictures.head_pictures import SAMPLES, UInt8
 
 TEXT = "Hello! All of me, in a few kilobits a second."
 UNKNOWN = "kilobits"

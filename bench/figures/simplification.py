@@ -1,7 +1,7 @@
 """How well does a simplified face keep its shape, its outline and its motion, beside other simplifiers?
 
-`python -m bench.simplification [STREAM...]` prints the tables of docs/simplify.md. Others: the quadrics of
-this project, and those of fast-simplification and pyfqmr where these are installed (pip install
+`python -m bench.figures.simplification [STREAM...]` prints the tables of docs/simplify.md. Others: the
+quadrics of this project, and those of fast-simplification and pyfqmr where these are installed (pip install
 fast-simplification pyfqmr); they know the face at rest only. Their vertices move like the mean of those that
 each stands for, or like the nearest one.
 """

@@ -16,7 +16,7 @@ from fba import Animation, BodyTrack, player
 from fba.body import gait
 from fba.parameters import baps
 
-SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[2] / "shared")
+SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[3] / "shared")
 CLIPS = (
     ("greta/Dance.bvh", 25.0, (0.12, 0.23, 0.45, 0.66, 0.77)),
     ("greta/c-Walkaround.bvh", 30.0, (0.35, 0.45, 0.55, 0.75, 0.85)),

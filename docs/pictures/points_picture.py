@@ -15,7 +15,7 @@ from tools.captures.heads import other_head
 from tools.captures.performances import perform_track
 from tools.captures.tracked_actor import film
 
-TARGET = Path(__file__).with_name("images") / "capture-points.jpg"
+TARGET = Path(__file__).parents[1] / "images" / "capture-points.jpg"
 SIZE = (200, 230)
 SCALE = 2
 TIMES = (0.2, 2.0, 3.5, 5.2, 7.2, 9.0)

@@ -20,7 +20,7 @@ from fba.live.addresses import StreamAddress
 from fba.live.streams import Pacer, StreamReceiver, StreamSender, repeated
 from fba.serving import Plane, split_stream
 
-SAMPLE = Path(__file__).parents[1] / "fba" / "samples" / "hello.fap"
+SAMPLE = Path(__file__).parents[2] / "fba" / "samples" / "hello.fap"
 LOCAL = "127.0.0.1"
 STREAMS = 200
 SECONDS = 10

@@ -1,4 +1,4 @@
-"""Makes the picture of styles of motion in docs/persona.md: `python docs/make_persona_style_picture.py`."""
+"""Makes the picture of styles of motion in docs/persona.md."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fba.persona import animate_as, learn
 from tools.persona import blind_test as blind
 from tools.persona.actors import act
 
-TARGET = Path(__file__).with_name("images") / "persona-styles.jpg"
+TARGET = Path(__file__).parents[1] / "images" / "persona-styles.jpg"
 SCRIPT = (("E_SURPRISE", 0.9), ("E_HAPPY", 0.9), ("viseme 10 (A:)", 0.9), ("E_SADNESS", 1.0))
 LONGER = 3
 """Times that the user performs the script, so that it is known how he moves."""
@@ -44,7 +44,3 @@ def pictures(animation: Animation, frames: list[int]) -> list[Image.Image]:
 
     with player.Offscreen(animation, SIZE, camera="front", samples=4) as view:
         return [Image.fromarray(view.frame(frame / float(animation.rate))[..., :3]) for frame in frames]
-
-
-if __name__ == "__main__":
-    main()

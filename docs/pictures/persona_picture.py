@@ -15,7 +15,7 @@ from fba.persona._observation import observe
 from fba.persona.points.layout import TRACKED, flat_mask, standard_mask, triangles
 from tools.persona.actors import Act, act, all_contents, named_styles
 
-TARGET = Path(__file__).with_name("images") / "persona.jpg"
+TARGET = Path(__file__).parents[1] / "images" / "persona.jpg"
 SIZE, SCALE = (210, 240), 1.45
 SCRIPT = (
     ("E_HAPPY", 1.1), ("viseme 10 (A:)", 1.0), ("LFAU_18", 1.0), ("E_SURPRISE", 0.9), ("E_ANGER", 1.0),

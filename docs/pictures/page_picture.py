@@ -1,4 +1,4 @@
-"""Make the picture of the page of `fba export`: `python docs/make_page_picture.py`; it takes Chromium."""
+"""Make the picture of the page of `fba export`: `python docs/make_pictures.py page`; it takes Chromium."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from PIL import Image
 import fba
 from fba_player.export.page import animation_page
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 WEB = ROOT / "player" / "fba_player" / "web"
 PLAYER = "document.querySelector('fba-player')"
 STEPS = [
@@ -43,7 +43,3 @@ def main() -> None:
         )
         picture = Image.open(io.BytesIO(shot.read_bytes())).convert("RGB")
     picture.save(ROOT / "docs" / "images" / "page.jpg", quality=88, optimize=True)
-
-
-if __name__ == "__main__":
-    main()

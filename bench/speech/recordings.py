@@ -1,4 +1,4 @@
-"""Recordings beside streams coded from them by others: `python -m bench.speech_recordings FOLDER`, a table.
+"""Recordings beside streams coded from them by others: `python -m bench.speech.recordings FOLDER`, a table.
 
 FOLDER holds pairs of a WAV file and a stream whose name ends with that of the sound. Printed are correlations
 of jaw and lips, of the stream as players show it with what `fba.speech` makes of the sound without its text;

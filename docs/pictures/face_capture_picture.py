@@ -12,7 +12,7 @@ from fba import player
 from fba.capture import ShapeMotion, from_blendshapes
 from fba.face import arkit_names
 
-TARGET = Path(__file__).with_name("images") / "capture-faces.jpg"
+TARGET = Path(__file__).parents[1] / "images" / "capture-faces.jpg"
 SIZE = (200, 230)
 COLUMNS = 6
 POSES = (

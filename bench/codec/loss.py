@@ -1,7 +1,7 @@
 """How much of a performance arrives where planes are lost or bits flipped, by I period and start codes?
 
 Encodes a performance in several ways, damages the streams with fixed seeds, salvages them, and compares what
-a player would show in each frame with what was sent. `python -m bench.loss FILE` prints the tables
+a player would show in each frame with what was sent. `python -m bench.codec.loss FILE` prints the tables
 of docs/robustness.md for a performance of your own.
 """
 
@@ -296,7 +296,7 @@ def tables(results: Sequence[Result]) -> list[str]:
 
 def main() -> None:
     """Run the study and print its tables."""
-    parser = argparse.ArgumentParser(prog="python -m bench.loss", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m bench.codec.loss", description=__doc__)
     parser.add_argument("file", nargs="?", help="a performance (default: the sample face, four times)")
     parser.add_argument("--rounds", type=int, default=40, help="damaged streams for each cell (default 40)")
     parser.add_argument("--seed", type=int, default=0, help="number of the series (default 0)")

@@ -21,7 +21,7 @@ from fba_player.scene.scene import Scene
 from fba_player.view.protocols import Showable
 
 SAMPLE = Path(fba.__file__).resolve().with_name("samples") / "talk.c3d"
-TARGET = Path(__file__).with_name("images") / "virtual-markers.jpg"
+TARGET = Path(__file__).parents[1] / "images" / "virtual-markers.jpg"
 MOMENTS = (1.6, 2.6, 3.7, 4.9)
 SIZE = (400, 460)
 

@@ -20,7 +20,7 @@ from tools.captures.heads import other_head
 from tools.captures.marked_actor import as_face
 from tools.captures.performances import HEAD, head_motion, perform_track
 
-TARGET = Path(__file__).with_name("images") / "capture-markers.jpg"
+TARGET = Path(__file__).parents[1] / "images" / "capture-markers.jpg"
 SAMPLES = Path(fba.__file__).parent / "samples"
 RATE = 50
 SIZE = (240, 250)

@@ -13,9 +13,9 @@ import numpy as np
 
 from fba.body import BapSolver, Skeleton, gait
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 MEASURED = ROOT / "tests" / "body" / "gait" / "winter_natural_cadence.csv"
-TARGET = Path(__file__).with_name("images") / "gait_curves.svg"
+TARGET = Path(__file__).parents[1] / "images" / "gait_curves.svg"
 WIDTH, HEIGHT, LEFT, TOP = 250, 130, 46, 26
 JOINTS = ("hip", "knee", "ankle")
 OURS, THEIRS = "#b3401f", "#1f5fb3"

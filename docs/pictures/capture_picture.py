@@ -23,9 +23,9 @@ from fba.errors import FbaWarning
 from fba.formats.bvh._reader import read_motion
 from fba.parameters import bap_numbers
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "fba/samples/hello.bvh"
-TARGET = Path(__file__).with_name("images") / "capture-report.jpg"
+TARGET = Path(__file__).parents[1] / "images" / "capture-report.jpg"
 SPOILED = {"r_wrist_twisting": 130.0, "l_sternoclavicular_abduct": 30.0}
 """BAPs, and degrees that are added to them."""
 WIDTH = 1200

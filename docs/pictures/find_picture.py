@@ -15,7 +15,7 @@ from fba.outlines import Choice, build_index, draw_sheet, read_mask
 from fba_player.export._offscreen import Offscreen
 from fba_player.scene.scene import Scene
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "fba/samples/hello.bvh"
 SIZE = 600
 FRAMES = (110, 250)
