@@ -72,7 +72,7 @@ def find_front_points(photograph: Photograph) -> FoundPoints:
     """
     grey = luminance(photograph.pixels)
     middle, across, score, where = _find_face(grey, photograph.name)
-    steps = [Step("Where a whole face is most likely", where)]
+    steps = [Step("How like a face of this size each place is", where)]
     face = standard_face(grey, middle, across)
     places, _ = features().follow(face, features().mean)
     steps.append(
@@ -140,7 +140,6 @@ def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8
     whole = features().whole
     side = min(height, width)
     best: list[tuple[float, Float64, Float64]] = []
-    shown = np.zeros((1, 1))
     for degrees in TURNS:
         eyes = LARGEST * side
         while eyes >= max(SMALLEST * side, EYES / SMALL):
@@ -154,8 +153,6 @@ def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8
             for y, x in _maxima(likeness):
                 middle, step = _turned_back(np.array([x, y], dtype=np.float64), small.shape, degrees)
                 best.append((float(likeness[y, x]), middle / factor, step * eyes))
-            if float(likeness.max()) >= max((one[0] for one in best), default=-np.inf):
-                shown = likeness
             eyes /= SIZES
     if not best:
         raise ModelError(f"{name or 'the picture'}: is too small for a face to be found")
@@ -179,7 +176,8 @@ def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8
                 stacklevel=3,
             )
             break
-    return middle, across, score, _grey_picture(shown / max(float(shown.max()), 1e-9))
+    shown = whole_likeness(_reduced(grey, EYES / SMALL / float(np.linalg.norm(across))), whole)
+    return middle, across, score, _grey_picture((shown + 1) / max(float(shown.max()) + 1, 1e-9))
 
 
 def _is_inside(middle: Float64, across: Float64, shape: tuple[int, ...]) -> bool:

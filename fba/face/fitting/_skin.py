@@ -93,8 +93,9 @@ def paint(
     )
     corner = _triangle_map(surface.texcoords[surface.triangles] * SIZE - 0.5, (SIZE, SIZE))
     own = _own_skin(part, surface, corner)
+    skin = np.ones((SIZE, SIZE), dtype=np.float32)
     if not hair:
-        own = _without_hair(own, model, surface, corner)
+        own, skin = _without_hair(own, model, surface, corner)
     layers = [_Layer(surface, model, photographs[0], views[0], first=True, alone=len(views) == 1)]
     if len(views) > 1:
         layers.insert(0, _Layer(surface, model, photographs[1], views[1], first=False, alone=False))
@@ -104,6 +105,7 @@ def paint(
         weight = np.zeros((SIZE, SIZE), dtype=np.float32)
         for rows, places, normals in _texels(surface, corner):
             colour[rows], weight[rows] = layer.look_up(places, normals)
+        weight *= skin
         result = _even(result, colour, weight, own)
         result += weight[..., None] * (colour - result)
         shown = np.maximum(shown, weight)
@@ -262,8 +264,13 @@ def _own_skin(part: Part, surface: _Surface, corner: Int32) -> Float32:
     return plain
 
 
-def _without_hair(own: Float32, model: FaceModel, surface: _Surface, corner: Int32) -> Float32:
-    """Return the head's own skin with the tone of the skin nearby where hair of the skull was."""
+def _without_hair(
+    own: Float32, model: FaceModel, surface: _Surface, corner: Int32
+) -> tuple[Float32, Float32]:
+    """Return the head's own skin with the tone of the skin nearby where hair of the skull was, and where not.
+
+    The second, (SIZE, SIZE), is 0 where hair was: photographs may show there what is behind the head.
+    """
     brows = float(model.points[[point_rows()["4.3"], point_rows()["4.4"]], 1].max())
     temples = float(model.points[[point_rows()["4.5"], point_rows()["4.6"]], 2].min())
     middle = surface.vertices[surface.triangles].mean(axis=1)
@@ -277,7 +284,8 @@ def _without_hair(own: Float32, model: FaceModel, surface: _Surface, corner: Int
         _spread(_shrink(own[..., channel] * known) / np.maximum(share, 1e-6), share) for channel in range(3)
     ]
     weight = gaussian_filter(gone.astype(np.float32), BALD_EDGE / 2)[..., None]
-    return np.asarray(own + weight * (_grow(np.stack(tones, axis=-1)) - own), dtype=np.float32)
+    bald = own + weight * (_grow(np.stack(tones, axis=-1)) - own)
+    return bald.astype(np.float32), 1 - weight[..., 0]
 
 
 def _even(below: Float32, above: Float32, weight: Float32, own: Float32) -> Float32:

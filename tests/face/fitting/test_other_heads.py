@@ -22,7 +22,7 @@ NO_FACES = ("coffee", "coins", "chelsea", "rocket", "page", "brick")
 @pytest.fixture(scope="module")
 def shown(shared: Path, opengl: None) -> list[Picture]:
     """A small picture of each of a few heads that are no variation of the built-in one."""
-    heads = other_heads(shared, ("facecap", "rpm646d", "MakeHuman"))
+    heads = other_heads(shared, ("rpm646d", "MakeHuman"))
     if not heads:
         pytest.skip("no heads in the shared folder")
     return [
