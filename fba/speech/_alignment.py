@@ -24,8 +24,8 @@ PADDING = 0.2
 LEAD = 0.0078
 """Seconds by which a frame begins later than its number says: its window of 25.6 ms is centred on it."""
 FLOOR = 45.0
-"""dB below the sound of the noise that is added for the recogniser. Digital silence, as of synthetic voices, has
-a spectrum like no sound, which spoils the mean by which it knows a voice."""
+"""dB below the sound of the noise that is added for the recogniser. Digital silence, as of synthetic voices,
+has a spectrum like no sound, which spoils the mean by which it knows a voice."""
 VOWELS = frozenset(["AA", "AE", "AH", "AO", "AW", "AY", "EH", "ER", "EY", "IH", "IY", "OW", "OY", "UH", "UW"])
 PLOSIVES = frozenset(["P", "B", "T", "D", "K", "G", "CH", "JH"])
 LONGEST_PLOSIVE = 0.15
