@@ -24,8 +24,8 @@ PADDING = 0.2
 LEAD = 0.0078
 """Seconds by which a frame begins later than its number says: its window of 25.6 ms is centred on it."""
 FLOOR = 45.0
-"""dB below the sound of the noise that is added for the recogniser. Digital silence, as in synthetic speech and
-gated recordings, has a spectrum like no sound, which spoils the mean by which it knows a voice."""
+"""dB below the sound of the noise that is added for the recogniser. Digital silence, as of synthetic voices,
+has a spectrum like no sound, which spoils the mean by which it knows a voice."""
 VOWELS = frozenset(["AA", "AE", "AH", "AO", "AW", "AY", "EH", "ER", "EY", "IH", "IY", "OW", "OY", "UH", "UW"])
 PLOSIVES = frozenset(["P", "B", "T", "D", "K", "G", "CH", "JH"])
 LONGEST_PLOSIVE = 0.15
@@ -33,8 +33,8 @@ LONGEST_PLOSIVE = 0.15
 MOST_WORDS = 7.0
 """Words in a second, at most."""
 HEARD, FOREIGN_HEARD = 38.0, 60.0
-"""By how much a frame of a word may be less likely than the likeliest sound, on average, for the word to count as
-heard, in pocketsphinx' scores: in English, and in other languages, whose sounds the recogniser does not know."""
+"""By how much frames of a word that is heard may be less likely, on average, than the likeliest sounds, in
+pocketsphinx' scores: in English, and in other languages, whose sounds the recogniser does not know."""
 FITS = 0.25
 """Share of words that must be heard for a text to be the one that is spoken."""
 GAP = 0.6
@@ -46,6 +46,9 @@ BEAM, PATIENT_BEAM, WIDE_BEAM = (1e-80, 1e-60), (1e-200, 1e-150), (1e-300, 1e-30
 DICTATION_BEAM = (1e-48, 7e-29)
 """The same where any English words may be spoken: pocketsphinx' own."""
 MISSED_NAMED = 5
+
+Costly = tuple[Word, float]
+"""A word, and by how much its frames are less likely, on average, than the likeliest sounds."""
 
 
 def find_speech(
@@ -194,8 +197,8 @@ class _Listener:
         )
         return _silenced(found, sound)
 
-    def align(self, sound: Int16, last: bool) -> tuple[list[Phone], list[tuple[Word, float]]]:
-        """Return the phones and words, with their costs, of the next part of the text in a sound, as far as it is spoken there.
+    def align(self, sound: Int16, last: bool) -> tuple[list[Phone], list[Costly]]:
+        """Return the phones and words of the next part of the text in a sound, as far as it is spoken there.
 
         last: whether it is the last of the sound's pieces, in which all that is left should be spoken.
         """
@@ -226,9 +229,7 @@ class _Listener:
             return 0
         return 0 if found is None else len(found.hypstr.split())
 
-    def _force(
-        self, sound: Int16, spoken: Sequence[Pronounced]
-    ) -> tuple[list[Phone], list[tuple[Word, float]]]:
+    def _force(self, sound: Int16, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Costly]]:
         """Return the phones and words of a text in a sound; no phones where nothing is like the words."""
         phones, words = self._align_by(self._forced, sound, spoken)
         if len(words) < len(spoken):  # it lost its way: again, more patiently
@@ -243,7 +244,7 @@ class _Listener:
 
     def _align_by(
         self, decoder: Any, sound: Int16, spoken: Sequence[Pronounced]
-    ) -> tuple[list[Phone], list[tuple[Word, float]]]:
+    ) -> tuple[list[Phone], list[Costly]]:
         decoder.set_align_text(" ".join(_spelled(word.text, self.english) for word in spoken))
         try:
             _run(decoder, sound)
@@ -254,11 +255,9 @@ class _Listener:
             alignment = None
         return ([], []) if alignment is None else self._collect(alignment, spoken)
 
-    def _collect(
-        self, alignment: Any, spoken: Sequence[Pronounced]
-    ) -> tuple[list[Phone], list[tuple[Word, float]]]:
+    def _collect(self, alignment: Any, spoken: Sequence[Pronounced]) -> tuple[list[Phone], list[Costly]]:
         phones: list[Phone] = []
-        words: list[tuple[Word, float]] = []
+        words: list[Costly] = []
         for item in alignment:
             cost = -item.score / item.duration
             parts = [(p.name, _seconds(p.start), p.duration * FRAME) for p in item]
@@ -365,8 +364,8 @@ def _within(phones: Iterable[Phone], seconds: float) -> Iterator[Phone]:
         yield Phone(SILENCE, at, seconds)
 
 
-def _smooth(spoken: Sequence[tuple[Word, float]]) -> Iterator[tuple[Word, float]]:
-    """Yield words with the mean cost of theirs and of their neighbours: short words alone would say little."""
+def _smooth(spoken: Sequence[Costly]) -> Iterator[Costly]:
+    """Yield words with the mean of their cost and their neighbours': short words alone would say little."""
     lengths = [word.end - word.start for word, _ in spoken]
     for at, (word, _) in enumerate(spoken):
         around = slice(max(at - 1, 0), at + 2)

@@ -54,8 +54,8 @@ def read_timings(path: PathLike) -> Speech:
                 return _order(_parse(parse, text), kind)
     if "jawopen" in text[:MOST_HEADER].lower():
         raise FormatError(
-            "holds ARKit's curves, the motion of a face rather than timings: `fba speak` takes them, and so does "
-            "perform as the motion that fba.read makes of them",
+            "holds ARKit's curves, the motion of a face rather than timings: `fba speak` takes them, and so "
+            "does perform as the motion that fba.read makes of them",
             path=path,
         )
     raise FormatError(

@@ -56,8 +56,8 @@ class _Said:
         type=options.FILE,
         metavar="FILE",
         help="Phones or visemes with their times, by another program: TextGrid, CTM, SRT with phones, files "
-        "of Montreal Forced Aligner, Rhubarb, Papagayo, Moho; visemes of Azure, Oculus, Polly as JSON; ARKit's "
-        "curves as CSV or JSON.",
+        "of Montreal Forced Aligner, Rhubarb, Papagayo, Moho; visemes of Azure, Oculus, Polly as JSON; "
+        "ARKit's curves as CSV or JSON.",
     )
     language: str = option(
         default="en-us",
