@@ -215,7 +215,7 @@ def main() -> None:
 
 def print_codings(sets: dict[str, list[Spoken]]) -> None:
     """Print what streams keep, of one sentence to all of them."""
-    print("\n| coding | goal, bit/s | sentences | in one stream | seconds | bit/s | within the goal | left out "
+    print("\n| coding | goal, bit/s | sentences | in a stream | seconds | bit/s | within the goal | left out "
           "| viseme right | lips, mean mm | 95 % within, mm | lips shut |")  # fmt: skip
     print(f"|{'---|' * 12}")
     for (coding, goal), (name, sentences) in product(GOALS.items(), sets.items()):
@@ -230,7 +230,7 @@ def print_codings(sets: dict[str, list[Spoken]]) -> None:
             print(
                 f"| {coding} | {goal} | {name} | {count} | {fmean(each.seconds for each in kept):.1f} "
                 f"| {bits:.0f} | {within} of {len(kept)} | {left_out:.0%} "
-                f"| {right:.1%} | {mean:.2f} | {largest:.1f} "
+                f"| {f'{right:.1%}' if coding == 'visemes' else ''} | {mean:.2f} | {largest:.1f} "
                 f"| {_closed([error for each in kept for error in each.closures])} |",
                 flush=True,
             )

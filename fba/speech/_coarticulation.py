@@ -134,7 +134,9 @@ def _closures(shapes: Sequence[Shape], rate: Fraction, count: int) -> Float64:
 
 def _close(values: Float64, shapes: Sequence[Shape], rate: Fraction, table: Float32) -> None:
     """Let lips, teeth and tongue meet at closures, whatever is beside them. The nearest frame is closed."""
-    for shape in shapes:
+    for shape in sorted(
+        shapes, key=lambda shape: shape.viseme != TONGUE_BETWEEN_TEETH
+    ):  # lips shut in any case
         for first, weights in _closure_frames(shape, rate, len(values)):
             part = values[first : first + len(weights)]
             change = weights[:, None] * (table[shape.viseme] - part)

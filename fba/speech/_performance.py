@@ -133,7 +133,7 @@ def _within_goal(mouth: _Mouth, most: float) -> _Mouth:
         mouth = replace(mouth, details=False)
         if mouth.bits() <= most:
             return mouth
-    order = rank_keys(mouth.keys, resolve(mouth.face(mouth.frames)).astype(np.float64))
+    order = rank_keys(mouth.keys, resolve(mouth.face(mouth.frames)).astype(np.float64), mouth.rate)
     few, many = 0, min(int(len(mouth.keys) * LEFT_OUT), len(order))
     while many - few > 1:
         middle = (few + many) // 2

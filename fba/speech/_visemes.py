@@ -18,6 +18,8 @@ CLOSED = (1, 2)
 """Visemes at which the lips, or lip and teeth, meet."""
 KEPT = (*CLOSED, 3)
 """Visemes that are not left out to save bits: these, and the tongue between the teeth."""
+MISSED = 140
+"""How much a sound may be missed that is left out to save bits, in units of FAPs, times seconds."""
 LONG = 0.22
 """Seconds from which a viseme is held: it has a key frame at its begin and at its end."""
 INSET = 0.06
@@ -55,12 +57,12 @@ def find_keys(shapes: Sequence[Shape], rate: Fraction) -> list[tuple[int, Shape]
     return [(frame, shape) for frame, shape, _ in keys]
 
 
-def rank_keys(keys: Sequence[tuple[int, Shape]], rows: Float64) -> list[int]:
+def rank_keys(keys: Sequence[tuple[int, Shape]], rows: Float64, rate: Fraction) -> list[int]:
     """Return the keys that may be left out, as their numbers, the ones that are missed least first.
 
     rows: float (K, columns), what the mouth shows at each. A key is missed by how far a straight line between
     its neighbours passes it, times the time between them. First and last, closures, what lies between two of
-    them, and the tongue between the teeth stay.
+    them, the tongue between the teeth, and what would be missed by more than `MISSED` stay.
     """
     closed = [shape.viseme in CLOSED for _, shape in keys]
     inner = range(1, len(keys) - 1)
@@ -74,7 +76,7 @@ def rank_keys(keys: Sequence[tuple[int, Shape]], rows: Float64) -> list[int]:
     links = times, rows, before, after
     cost = np.array([_missed(at, *links) if free[at] else np.inf for at in range(len(keys))])
     order: list[int] = []
-    while cost.size and np.isfinite(cost.min()):
+    while cost.size and cost.min() <= MISSED * rate:
         at = int(cost.argmin())
         order.append(at)
         cost[at] = np.inf
