@@ -17,7 +17,6 @@ MOST_CONFIGURATION = 1 << 12
 """Most bytes of a configuration."""
 _ENCODINGS: dict[str, PayloadKind] = {"mpeg4-generic": "3640", "mp4v-es": "6416"}
 _NAMES = {"3640": "mpeg4-generic", "6416": "MP4V-ES"}
-_DYNAMIC = range(96, 128)
 _EXPECTED = f"expected a=rtpmap with mpeg4-generic/{CLOCK_RATE} or MP4V-ES/{CLOCK_RATE}"
 
 

@@ -9,7 +9,6 @@ from fba.errors import FbaError
 
 Scheme = Literal["rtp", "udp", "tcp"]
 _ADDRESS = re.compile(r"(rtp|udp|tcp)://?(?:\[([^\]]*)\]|([^:/\[\]]*)):([0-9]{1,5})/?")
-_LIKE_ADDRESS = re.compile(r"[a-z][a-z0-9+.-]+:/")
 
 
 class StreamAddress(NamedTuple):
@@ -24,13 +23,8 @@ class StreamAddress(NamedTuple):
         return f"{self.scheme}://{shown}:{self.port}"
 
 
-def is_address(text: str) -> bool:
-    """Whether a text is meant as an address, right or wrong. A path keeps one of its two slashes."""
-    return _LIKE_ADDRESS.match(text) is not None
-
-
 def parse_address(text: str) -> StreamAddress:
-    """Return an address. Raises FbaError for another text."""
+    """Return an address, which as a path has lost one of its two slashes. FbaError for another text."""
     match = _ADDRESS.fullmatch(text)
     port = int(match[4]) if match else 0
     if match is None or not 0 < port < 65_536:

@@ -6,7 +6,6 @@ ISO/IEC 14496-1, nodes FaceDefTables, FaceDefMesh and FaceDefTransform.
 from __future__ import annotations
 
 import threading
-from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -14,11 +13,10 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int64, UInt32
 from fba.errors import RangeError
-from fba.face.deform._normals import Surface, build_surface
+from fba.face.deform._normals import build_surface
 from fba.face.deform.flat_tables import (
     VALUE_MAX,
-    Shifts,
-    Transforms,
+    FlatModel,
     all_vertices,
     bound_points,
     flatten_shifts,
@@ -33,25 +31,11 @@ FRAMES_PER_CALL = 64
 """Frames per call of the compiled loop: Ctrl-C takes effect between calls only."""
 
 
-class _FlatModel(NamedTuple):
-    """The tables of a model as flat arrays for the compiled loops."""
-
-    part_start: Int64
-    """(P + 1,) first vertex of each part, and the number of all."""
-    shifts: Shifts
-    transforms: Transforms
-    surface: Surface
-    point_shifts: Shifts
-    """The shifts of feature points that are bound to vertices."""
-    owner: Int64
-    """(84,) part whose transforms move each feature point, -1 for the head alone."""
-
-
-_flat_models: WeakKeyDictionary[FaceModel, _FlatModel] = WeakKeyDictionary()
+_flat_models: WeakKeyDictionary[FaceModel, FlatModel] = WeakKeyDictionary()
 """Cache of flat tables, as long as their models live: models do not change."""
 
 
-def _flat_model(model: FaceModel) -> _FlatModel:
+def _flat_model(model: FaceModel) -> FlatModel:
     """Return the flat tables of a model, with scratch arrays of their own, for several threads."""
     tables = _flat_models.get(model)
     if tables is None:
@@ -64,9 +48,10 @@ def _flat_model(model: FaceModel) -> _FlatModel:
     )
 
 
-def _flatten(model: FaceModel) -> _FlatModel:
+def _flatten(model: FaceModel) -> FlatModel:
     shifts = flatten_shifts(model, all_vertices(model), np.float32)
-    return _FlatModel(
+    return FlatModel(
+        rest=model.vertices,
         part_start=np.cumsum([0, *(len(part.vertices) for part in model.parts)], dtype=np.int64),
         shifts=shifts,
         transforms=flatten_transforms(model),
@@ -198,11 +183,7 @@ class Deformer:
                 stop = start + FRAMES_PER_CALL
                 self._loops.deform_frames(
                     values[start:stop],
-                    self.model.vertices,
-                    self._tables.part_start,
-                    self._tables.shifts,
-                    self._tables.transforms,
-                    self._tables.surface,
+                    self._tables,
                     self._scratch,
                     with_head,
                     out_frames[start:stop],

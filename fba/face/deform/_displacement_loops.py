@@ -12,7 +12,7 @@ import numpy as np
 from fba.arrays import Float32, Float64, Int64
 from fba.compiled import compiled
 from fba.face.deform._loops import compose, transform_points
-from fba.face.deform.flat_tables import Shifts, Transforms
+from fba.face.deform.flat_tables import FlatModel, Shifts
 
 
 class Scratch(NamedTuple):
@@ -103,25 +103,23 @@ def _add_part(shifts: Shifts, part: int, one: Float64, other: Float64, apart: bo
 def measure_frames(
     one: Float64,
     other: Float64,
-    rest: Float32,
-    part_start: Int64,
-    shifts: Shifts,
-    transforms: Transforms,
+    tables: FlatModel,
     scratch: Scratch,
-    largest: Float64,
-    worst: Int64,
+    farthest: tuple[Float64, Int64],
     unit: float,
     counts: Int64,
 ) -> None:
     """Measure how far vertices are apart, in the head's frame, by FAPs `one` and `other` (T, 68).
 
-    largest, worst: (T,), set to the largest distance in a frame, metres, and its vertex. counts: int64 (B,),
+    farthest: (T,) each, set to the largest distance in a frame, metres, and its vertex. counts: int64 (B,),
     raised for every vertex that moved: the number n for up to n units, the last one for all beyond.
     """
+    largest, worst = farthest
+    part_start, shifts = tables.part_start, tables.shifts
     poses, others = scratch.one_poses, scratch.other_poses
     for frame in range(len(one)):
-        compose(one[frame], transforms, poses)
-        compose(other[frame], transforms, others)
+        compose(one[frame], tables.transforms, poses)
+        compose(other[frame], tables.transforms, others)
         most, place = 0.0, 0
         for part in range(len(poses) - 1):
             start, stop = int(part_start[part]), int(part_start[part + 1])
@@ -131,7 +129,7 @@ def measure_frames(
                 for column in range(4):
                     turned = turned or poses[part, row, column] != others[part, row, column]
             if turned:
-                first[:], second[:] = rest[start:stop], rest[start:stop]
+                first[:], second[:] = tables.rest[start:stop], tables.rest[start:stop]
                 _add_part(shifts, part, one[frame], other[frame], True, scratch)
                 scratch.pose[:] = others[part]
                 transform_points(scratch.pose, second, second)

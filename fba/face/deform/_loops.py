@@ -18,7 +18,7 @@ import numpy as np
 from fba.arrays import Array, Float32, Float64, Int64
 from fba.compiled import compiled
 from fba.face.deform._normals import Surface
-from fba.face.deform.flat_tables import Shifts, Transforms
+from fba.face.deform.flat_tables import FlatModel, Shifts, Transforms
 
 MIN_SQUARE = np.float32(1e-30)
 """Squared length of a sum of normals below which it has no direction."""
@@ -267,26 +267,18 @@ def allocate_scratch(vertices: int, parts: int) -> Scratch:
 
 @compiled
 def deform_frames(
-    values: Float64,
-    rest: Float32,
-    part_start: Int64,
-    shifts: Shifts,
-    transforms: Transforms,
-    surface: Surface,
-    scratch: Scratch,
-    with_head: bool,
-    out: Float32,
-    normals: Float32,
+    values: Float64, tables: FlatModel, scratch: Scratch, with_head: bool, out: Float32, normals: Float32
 ) -> None:
     """Write the vertices for FAPs `values` (T, 68) to `out` and their normals to `normals`, both (T, V, 3).
 
-    rest: (V, 3) neutral vertices. normals: (0, V, 3) for none. with_head: apply the head's transforms.
+    normals: (0, V, 3) for none. with_head: apply the head's transforms.
     """
+    part_start, surface = tables.part_start, tables.surface
     for frame in range(len(values)):
-        copy(rest, scratch.moved)
+        copy(tables.rest, scratch.moved)
         scratch.touched[:] = 0
-        add_shifts(values[frame], shifts, scratch.moved, scratch.touched)
-        compose(values[frame], transforms, scratch.poses)
+        add_shifts(values[frame], tables.shifts, scratch.moved, scratch.touched)
+        compose(values[frame], tables.transforms, scratch.poses)
         head = len(scratch.poses) - 1
         for part in range(head):
             if with_head:

@@ -75,14 +75,13 @@ class DisplacementMeter:
         tables, count = self._deformer._tables, len(first)
         largest, worst = np.zeros(count), np.zeros(count, dtype=np.int64)
         counts = np.zeros(BINS + 2, dtype=np.int64)
-        model = self.model
         different = np.flatnonzero((first[:, 2:] != second[:, 2:]).any(axis=1))
         for start in range(0, len(different), FRAMES_PER_CALL):
             frames = different[start : start + FRAMES_PER_CALL]
             own_largest, own_worst = np.zeros(len(frames)), np.zeros(len(frames), dtype=np.int64)
             self._loops.measure_frames(
-                first[frames], second[frames], model.vertices, tables.part_start, tables.shifts,
-                tables.transforms, self._scratch, own_largest, own_worst, MAX_DISTANCE / BINS, counts,
+                first[frames], second[frames], tables, self._scratch, (own_largest, own_worst),
+                MAX_DISTANCE / BINS, counts,
             )  # fmt: skip
             largest[frames], worst[frames] = own_largest, own_worst
         counts[0] += max(self._count_movable() * count - int(counts.sum()), 0)

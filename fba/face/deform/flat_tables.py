@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fba.arrays import Array, Bool, Float64, Int64, Intp, UInt32
+from fba.arrays import Array, Bool, Float32, Float64, Int64, Intp, UInt32
 from fba.errors import ModelError
 from fba.face._tables import HEAD, FaceDefMesh
+from fba.face.deform._normals import Surface
 from fba.face.model import FaceModel
 from fba.parameters import faps
 
@@ -66,6 +67,22 @@ class Transforms(NamedTuple):
     """(K, 3) for one step: metres, radians about each axis, or growth."""
     centre: Float64
     """(K, 3) metres."""
+
+
+class FlatModel(NamedTuple):
+    """A model's vertices, and its tables as flat arrays, for the compiled loops."""
+
+    rest: Float32
+    """(V, 3) neutral vertices."""
+    part_start: Int64
+    """(P + 1,) first vertex of each part, and the number of all."""
+    shifts: Shifts
+    transforms: Transforms
+    surface: Surface
+    point_shifts: Shifts
+    """The shifts of feature points that are bound to vertices."""
+    owner: Int64
+    """(84,) part whose transforms move each feature point, -1 for the head alone."""
 
 
 Members = list[tuple[Intp, Intp]]

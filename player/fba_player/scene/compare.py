@@ -36,7 +36,7 @@ ARRANGEMENTS = ("side", "over", "colour", "wipe")
 how far they are from the first; two in the same place, one on each side of a line."""
 ROOTS = ("own", "common")
 """Bodies move as they were recorded; or all where the first one's root is."""
-SAMPLES = 24
+SCALE_SAMPLES = 24
 """Number of moments from which the scale of the colours is taken."""
 COLOURS = ("#2f9bff", "#ff5a36", "#39c26b", "#c266ff", "#f2b500")
 """Colours (sRGB) of the drawings over the first, in turn."""
@@ -280,7 +280,9 @@ class CompareScene(Timed[CompareTimeline]):
         key = (self.timeline.arrived, self.root)
         if self._scale is None or self._scale[0] != key:
             most = 0.0
-            for time in np.linspace(float(self.timeline.start), float(self.timeline.end), SAMPLES).tolist():
+            for time in np.linspace(
+                float(self.timeline.start), float(self.timeline.end), SCALE_SAMPLES
+            ).tolist():
                 times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
                 first = self.scenes[0].view_at(times[0]).faces
                 for number in range(1, len(self.scenes)):

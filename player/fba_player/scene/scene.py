@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["LOOKS", "SWITCHES", "Scene", "default_camera"]
 
 
-SAMPLES = 48
+EXTENT_SAMPLES = 48
 """Number of moments at which a body's extent is sampled to fit the camera."""
 LOOKS = ("figure", "points")
 """How a scene may be shown: as a person, or as feature points and bones."""
@@ -264,7 +264,7 @@ class Scene(Timed[Timeline]):
         grown = frames >= 2 * self._sampled_frames  # a stream, by much
         if self._extent is None or self._extent[0] != self.follow or grown:
             self._sampled_frames = frames
-            sampled = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
+            sampled = np.unique(np.linspace(0, frames - 1, min(frames, EXTENT_SAMPLES)).astype(int))
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in sampled])
             positions = self._poser.plain.pose(baps)[:, :, :3, 3]
             extent = body_extent(positions, self._skeleton.names, self.person.headroom, follow=self.follow)

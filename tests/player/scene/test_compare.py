@@ -302,3 +302,12 @@ def test_a_common_root_is_that_of_the_first() -> None:
 )
 def test_scales_are_round(distance: float, rounded: float) -> None:
     assert round_up(distance) == pytest.approx(rounded)
+
+
+def test_figures_posed_beside_each_other_are_as_alone(pair: CompareScene) -> None:
+    """Also a scene that is shown twice, which has one pose at a time."""
+    for scenes in (pair.scenes, (pair.scenes[1], pair.scenes[1])):
+        shown = CompareScene(scenes).view_at(0.1).faces
+        alone = [mesh.positions for scene in scenes for mesh in scene.view_at(0.1).faces]
+        for mesh, positions in zip(shown, alone, strict=True):
+            np.testing.assert_array_equal(mesh.positions, positions)
