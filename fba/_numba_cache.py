@@ -59,7 +59,7 @@ class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types here
             # A file with the right digest was made by the same versions of everything, and should load. If it
             # does not, for whatever reason, the function is compiled.
             with contextlib.suppress(Exception):
-                # Numba's `load_overload` first loads all that it can compile, which takes longer than the rest.
+                # Numba's `load_overload` first loads all that numba can compile: longer than the rest.
                 rtsys.initialize(target)
                 loaded = self._numba._load_overload(signature, target)
         if loaded is None:

@@ -20,6 +20,7 @@ import pytest
 from fba.animation import Animation
 from fba.errors import DisplayError
 from fba.formats import merge, read
+from fba_player.view.switches import Quality
 
 moderngl = pytest.importorskip("moderngl")
 FRAMES = 90
@@ -41,7 +42,7 @@ def sample() -> Animation:
     return merge(face, body.resample(face.rate))
 
 
-@pytest.fixture(params=["face", "person", "eight persons"])
+@pytest.fixture(params=["face", "person", "eight persons", "person, fine"])
 def shown(request: Any, sample: Animation) -> Iterator[tuple[str, Any]]:
     from fba.player import CompareScene, Offscreen, Scene
 
@@ -49,7 +50,8 @@ def shown(request: Any, sample: Animation) -> Iterator[tuple[str, Any]]:
     if request.param == "eight persons":
         subject = CompareScene([Scene(sample) for _ in range(8)])
     try:
-        with Offscreen(subject, (1280, 720)) as view:
+        quality = Quality.FINE if "fine" in request.param else Quality.FAST  # as while playing
+        with Offscreen(subject, (1280, 720), samples=quality.samples) as view:
             yield request.param, view
     except DisplayError as error:
         pytest.skip(str(error))

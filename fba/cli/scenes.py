@@ -119,6 +119,10 @@ class SceneOptions(Reading):
         help="Level of detail of faces: by their size in pixels (default), or one of those that the model "
         "holds, from fine to coarse; 0 or full: all triangles, also of bodies."
     )
+    quality: Literal["auto", "fast", "fine"] | None = option(
+        help="Edges smooth by four samples a pixel (fine), or only along outlines (fast). Default: fine, but "
+        "fast in a window without a graphics card."
+    )
     axes: Literal["iso", "vreng"] = option(
         default="iso", help="Which way BAPs turn: as the standard says, or as in some old files."
     )
@@ -245,7 +249,8 @@ def build_scene(
 
         result = CompareScene(scenes, arrangement=how.arrange or ("over" if over else "side"), names=names)
         result.root = how.root or result.root
-    for switch, state in (*how.shows, *([("lod", how.lod)] if how.lod is not None else [])):
+    given = [(name, value) for name in ("lod", "quality") if (value := getattr(how, name)) is not None]
+    for switch, state in (*how.shows, *given):
         result.show(switch, state)
     result.follow, result.orbit = how.follow, how.orbit
     return result

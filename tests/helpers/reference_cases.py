@@ -25,7 +25,7 @@ from fba.player import Camera, Offscreen, Scene
 from fba.tracks import BodyTrack
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._figure.person import Person, build_person
-from fba_player.view.switches import parse_switch
+from fba_player.view.switches import Quality, parse_switch
 
 FOLDER = Path(__file__).parents[1] / "player" / "gl" / "references"
 NEAR = {"eyes": "3.5", "mouth": "2.2"}
@@ -117,7 +117,7 @@ class Drawer:
         """The picture: uint8 (H, W, 4). scene: instead of the case's own. moved: to the left, down."""
         scene = scene or case.scene()
         if case.size not in self._open:
-            self._open[case.size] = Offscreen(scene, case.size)
+            self._open[case.size] = Offscreen(scene, case.size, samples=Quality.FAST.samples)
         offscreen = self._open[case.size]
         offscreen.scene = scene
         if case.camera in NEAR:

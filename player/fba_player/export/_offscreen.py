@@ -18,19 +18,16 @@ from fba_player.scene.scene import Scene
 from fba_player.view._camera import FACE_PRESETS, Camera
 from fba_player.view._view import View
 from fba_player.view.protocols import Closing, Showable
-
-SAMPLES = 0
-"""Samples per pixel; 0 is one, with edges smoothed afterwards."""
-TRANSPARENT_SAMPLES = 4
-"""Least samples per pixel if the background is transparent."""
+from fba_player.view.switches import Quality, samples_of
 
 
 class Offscreen(Closing):
     """Renders a scene into memory; needs no display.
 
     subject: an animation or a scene. size: width and height in pixels, at least 1 each. camera: a `Camera`,
-    the name of a preset, or None for the one that suits the content. samples: samples per pixel; 0 is one,
-    followed by a pass that smooths edges. Use it as a context manager, or `close` it; in one thread.
+    the name of a preset, or None for the one that suits the content. samples: samples per pixel, unless the
+    scene's switch "quality" says otherwise; 0 is one, followed by a pass that smooths edges. Use it as a
+    context manager, or `close` it; in one thread.
 
     Raises DisplayError if OpenGL is missing or cannot draw this size, saying what to install; ValueError for
     a size below 1 or an unknown preset.
@@ -42,7 +39,7 @@ class Offscreen(Closing):
         size: tuple[int, int] = (1280, 720),
         camera: Camera | str | None = None,
         *,
-        samples: int = SAMPLES,
+        samples: int = Quality.FINE.samples,
     ) -> None:
         width, height = (int(v) for v in size)
         if width < 1 or height < 1:
@@ -53,13 +50,12 @@ class Offscreen(Closing):
         self.camera = camera if isinstance(camera, Camera) else self.scene.camera(camera, aspect)
         self._of_head = looks_at_head(camera)
         self._gl: Any = offscreen_context()
-        self._target: Target | None = None
+        self._targets: dict[int, Target] = {}
         self._renderer: Renderer | None = None
-        self._multisampled: Target | None = None
         self._samples = samples
         try:
             with self._gl:  # current only while it is used: other contexts of this thread keep working
-                self._target = Target(self._gl, self.size, samples)
+                self._target(samples)
                 self._renderer = Renderer(self._gl)
         except Exception:
             self.close()
@@ -76,8 +72,6 @@ class Offscreen(Closing):
 
     def draw(self, time: float) -> UInt8:
         """Return the picture at a time, as `frame` returns it, in memory that the next call overwrites."""
-        if self._target is None:
-            raise ValueError("this Offscreen is closed")
         camera = follow_camera(self.camera, self.scene, time, of_head=self._of_head)
         return self._draw_view(self.scene.view_at(time), camera)
 
@@ -93,25 +87,30 @@ class Offscreen(Closing):
         return self._draw_view(self.scene.still(values), self.camera).copy()
 
     def _draw_view(self, view: View, camera: Camera) -> UInt8:
-        if self._target is None or self._renderer is None:
+        if self._renderer is None:
             raise ValueError("this Offscreen is closed")
         if self.scene.switches["background"] == "transparent":
             return cut_out(*self._draw_over_black_and_white(view, camera))
-        return self._read(view, camera, self._target)
+        return self._read(view, camera, samples_of(self.scene.switches, self._samples))
 
     def _draw_over_black_and_white(self, view: View, camera: Camera) -> list[UInt8]:
         """Return both pictures, multisampled: smoothing would miss dark edges before black."""
-        with self._gl:
-            if self._multisampled is None:
-                self._multisampled = Target(self._gl, self.size, max(self._samples, TRANSPARENT_SAMPLES))
+        samples = max(self._samples, Quality.FINE.samples)
         views = [replace(view, background=(shade,) * 3) for shade in (0.0, 1.0)]
-        return [self._read(other, camera, self._multisampled).copy() for other in views]
+        return [self._read(other, camera, samples).copy() for other in views]
 
-    def _read(self, view: View, camera: Camera, target: Target) -> UInt8:
+    def _target(self, samples: int) -> Target:
+        """Return the framebuffer with so many samples a pixel."""
+        if samples not in self._targets:
+            self._targets[samples] = Target(self._gl, self.size, samples)
+        return self._targets[samples]
+
+    def _read(self, view: View, camera: Camera, samples: int) -> UInt8:
         assert self._renderer is not None
         with self._gl:
+            target = self._target(samples)
             target.begin()
-            within = self._renderer.draw(view, camera, self.size)
+            within = self._renderer.draw(view, camera, self.size, smoothed=target.smoothed)
             target.finish(within=within).read_into(self._buffer, components=4)
         width, height = self.size
         pixels = np.frombuffer(self._buffer, dtype=np.uint8).reshape(height, width, 4)
@@ -124,10 +123,11 @@ class Offscreen(Closing):
         if self._gl is None:
             return
         with self._gl:
-            for part in (self._renderer, self._target, self._multisampled):
+            for part in (self._renderer, *self._targets.values()):
                 if part is not None:
                     part.close()
-        self._renderer = self._target = self._multisampled = None
+        self._renderer = None
+        self._targets.clear()
         self._gl.release()
         self._gl = None
 

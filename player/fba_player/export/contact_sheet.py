@@ -183,7 +183,7 @@ def _sheet(scene: Scene, kind: str, size: tuple[int, int]) -> Any:
     sheet = Image.new("RGB", layout.size, PAPER)
     draw = ImageDraw.Draw(sheet)
     font, small = label_font(letters), label_font(letters * 0.9)
-    with Offscreen(scene, size, samples=4) as view:
+    with Offscreen(scene, size) as view:
         for tile, (x, y) in zip(shown, layout.corners, strict=True):
             subject = close_up(tile.view, scene)
             view.camera = Camera(yaw=tile.yaw, pitch=tile.pitch).fit(subject, width / height)

@@ -22,8 +22,6 @@ Progress = Callable[[int, int], None]
 
 TILE = (320, 240)
 """Default width and height of one picture in pixels."""
-SAMPLES = 4
-"""Samples of each pixel, which smooth edges."""
 
 
 def film_sheet(
@@ -59,7 +57,7 @@ def film_sheet(
     sheet = Image.new("RGB", layout.size, PAPER)
     draw = ImageDraw.Draw(sheet)
     font = label_font(letters)
-    with Offscreen(scene, size, camera, samples=SAMPLES) as view:
+    with Offscreen(scene, size, camera) as view:
         for number, (frame, (x, y)) in enumerate(zip(frames, layout.corners, strict=True)):
             time = scene.timeline.time_of(frame)
             sheet.paste(Image.fromarray(view.frame(float(time))[..., :3]), (x, y))

@@ -41,7 +41,7 @@ def photo_sheet(photos: Sequence[Photo], head: PhotoHead, steps: Sequence[Step] 
     scene = Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model=head.model)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        with Offscreen(scene, CELL, samples=4) as view:
+        with Offscreen(scene, CELL) as view:
             for title, yaw, values in VIEWS:
                 faps = np.zeros(FAP_COUNT)
                 for number, value in values.items():

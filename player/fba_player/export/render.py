@@ -38,8 +38,6 @@ MAX_FILM_FRAMES = 1_000_000
 """Most frames of a film: a longer one comes from damaged times, or a part of it was meant."""
 SLACK = 0.001
 """Seconds that a given time may lie outside the animation: people round times."""
-PICTURE_SAMPLES = 4
-"""Samples per pixel of a single picture, which need not be fast."""
 SIZE = (1280, 720)
 GIF_SIZE = (480, 270)
 """Default sizes in pixels; a GIF of full size would be huge."""
@@ -108,7 +106,7 @@ def render(
     at = _picture_time(scene, frame, time if time is not None else start)
     with (
         _background(scene, clear=transparent),
-        Offscreen(scene, size or SIZE, camera, samples=PICTURE_SAMPLES) as offscreen,
+        Offscreen(scene, size or SIZE, camera) as offscreen,
     ):
         write_picture(target, offscreen.frame(at), transparent=transparent)
     if progress is not None:
@@ -162,8 +160,7 @@ def record(
             recorder = Recorder(path, (width, height), rate=film, audio=audio, audio_start=into)
         stack.enter_context(recorder)
         stack.enter_context(_background(shown, clear=transparent))
-        samples = PICTURE_SAMPLES if transparent else 0
-        offscreen = stack.enter_context(Offscreen(shown, (width, height), camera, samples=samples))
+        offscreen = stack.enter_context(Offscreen(shown, (width, height), camera))
         for number in range(count):
             recorder.add(offscreen.draw(float(first + number / film)))
             if progress is not None:

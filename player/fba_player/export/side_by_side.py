@@ -17,7 +17,7 @@ from fba_player.export._offscreen import Offscreen
 from fba_player.export._recorder import FILMS, Recorder
 from fba_player.export._sheet_layout import PAPER, TEXT, check_tile, lay_out
 from fba_player.export.image_files import PICTURES, write_picture
-from fba_player.export.render import PICTURE_SAMPLES, as_scene, film_rate
+from fba_player.export.render import as_scene, film_rate
 from fba_player.view._camera import Camera
 from fba_player.view._font import label_font, shortened
 from fba_player.view.protocols import Showable
@@ -58,8 +58,7 @@ def draw_side_by_side(
     check_tile(size)
     with ExitStack() as stack:
         grid = _Grid(list(scenes), size)
-        samples = PICTURE_SAMPLES if suffix in PICTURES else 0
-        drawn = (Offscreen(scene, size, camera, samples=samples) for scene in scenes.values())
+        drawn = (Offscreen(scene, size, camera) for scene in scenes.values())
         views = [stack.enter_context(view) for view in drawn]
         if suffix in PICTURES:
             middles = [scene.timeline.time_of(scene.timeline.frames // 2) for scene in scenes.values()]

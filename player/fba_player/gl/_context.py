@@ -17,6 +17,8 @@ PACKAGES = {
     "libX11.so.6": ("libx11-6", "libX11"),
 }
 """Libraries, and the packages that contain them: in Debian and Ubuntu, and in Fedora."""
+SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "swrast", "software", "basic render")
+"""Parts of the names of drivers that draw without a graphics card."""
 OPENGL = ("libEGL.so.1", "libGL.so.1")
 """The libraries that pictures without a window need."""
 
@@ -56,6 +58,12 @@ def offscreen_context() -> Any:
         "(Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri), or update the graphics driver; "
         "where the variable DISPLAY names a display that is not there, unset it: none is needed"
     )
+
+
+def is_software(context: Any) -> bool:
+    """Return whether the processor draws what a moderngl context draws, as its driver says."""
+    driver = context.info["GL_RENDERER"].lower()
+    return any(name in driver for name in SOFTWARE)
 
 
 def missing_libraries(names: Iterable[str] = OPENGL) -> list[str]:

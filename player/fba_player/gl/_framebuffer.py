@@ -21,13 +21,14 @@ from fba_player.gl._resources import load_program, make_buffer, write_buffer
 class Target:
     """A framebuffer of a fixed size on a moderngl context.
 
-    samples: samples per pixel; 0 for one sample and smoothed edges. `begin`, draw, then `finish` gives the
-    framebuffer that holds the picture. Raises DisplayError if the driver cannot allocate it.
+    samples: samples per pixel; 0 for one sample and smoothed edges, see `smoothed`. `begin`, draw, then
+    `finish` gives the framebuffer that holds the picture. Raises DisplayError if the driver cannot allocate
+    it.
     """
 
     def __init__(self, context: Any, size: tuple[int, int], samples: int) -> None:
         self._gl = context
-        self.size = size
+        self.size, self.samples = size, samples
         self._parts: list[Any] = []
         largest = min(context.info["GL_MAX_RENDERBUFFER_SIZE"], *context.info["GL_MAX_VIEWPORT_DIMS"])
         if max(size) > largest:
@@ -69,18 +70,26 @@ class Target:
         self._parts.append(part)
         return part
 
+    @property
+    def smoothed(self) -> bool:
+        """Whether `finish` smooths edges, for lack of samples."""
+        return self._pass is not None
+
     def begin(self) -> None:
         self._drawn.use()
 
     def finish(self, into: Any = None, within: Steps | None = None) -> Any:
-        """Return the framebuffer with the finished picture: its own, or, with samples = 0, `into`.
+        """Return the framebuffer with the finished picture: its own, or `into`.
 
         within: the regions to be smoothed; everywhere by default. `into` may be a window's framebuffer, whose
         size is taken to be that of this target, as moderngl does not notice that a window was resized.
         """
         if self._pass is None:
             self._gl.copy_framebuffer(self._result, self._drawn)
-            return self._result
+            if into is None:
+                return self._result
+            self._gl.copy_framebuffer(into, self._result)  # of another format, where samples cannot be copied
+            return into
         result = self._result if into is None else into
         everything = (0, 0, *self.size)
         rectangles = [everything] if within is None else within.rectangles

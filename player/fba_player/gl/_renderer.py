@@ -83,19 +83,28 @@ class Renderer:
         """Whether a face of the last picture was changing from one level of detail to another."""
         return self._details.morphing
 
-    def draw(self, view: View, camera: Camera, size: tuple[int, int], now: float | None = None) -> Steps:
+    def draw(
+        self,
+        view: View,
+        camera: Camera,
+        size: tuple[int, int],
+        now: float | None = None,
+        *,
+        smoothed: bool = True,
+    ) -> Steps:
         """Clear the bound framebuffer, draw the view, and return where its edges need smoothing.
 
         size: width and height of the framebuffer in pixels. now: seconds, by which levels of detail change
-        gradually; None for a picture that does not depend on the one before.
+        gradually; None for a picture that does not depend on the one before. smoothed: False where no edges
+        are smoothed afterwards; none are looked for then.
         """
-        steps = self._draw_whole(view, camera, size, now)
+        steps = self._draw_whole(view, camera, size, now, smoothed=smoothed)
         if view.wipe is None:
             return steps
         gl, morphing = self._gl, self.morphing
         line = round(view.wipe.at * size[0])
         gl.fbo.scissor = (line, 0, size[0] - line, size[1])
-        others = self._draw_whole(view.wipe.view, camera, size, now)
+        others = self._draw_whole(view.wipe.view, camera, size, now, smoothed=smoothed)
         half = max(round(WIPE_LINE * size[1]), 1)
         gl.fbo.scissor = (line - half, 0, 2 * half, size[1])
         gl.fbo.clear(1.0, 1.0, 1.0, 1.0)
@@ -104,7 +113,9 @@ class Renderer:
         bands = np.concatenate([steps.bands, others.bands])
         return Steps([*steps.rectangles, *others.rectangles], bands)
 
-    def _draw_whole(self, view: View, camera: Camera, size: tuple[int, int], now: float | None) -> Steps:
+    def _draw_whole(
+        self, view: View, camera: Camera, size: tuple[int, int], now: float | None, *, smoothed: bool
+    ) -> Steps:
         gl = self._gl
         aspect = size[0] / max(size[1], 1)
         seen = camera.view_matrix()
@@ -127,6 +138,9 @@ class Renderer:
         self._faces.draw(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
+        if not smoothed:
+            return Steps([], np.zeros((0, 2), dtype=np.float32))
+        if view.extras is not None:
             drawn = replace(drawn, faces=[*drawn.faces, *view.extras.shells])
         return find_steps(drawn, matrix, size, self._outliner)
 

@@ -21,13 +21,12 @@ from fba_player.gl._framebuffer import Target
 from fba_player.gl._renderer import Renderer
 from fba_player.session._session import Session
 from fba_player.sound.soundtrack import FilmSound
+from fba_player.view.switches import Quality
 
 FILM_RATE = 30
 """Frames per second of a film of the window."""
 SPEED_FRAMES = 30
 """Frames of a film over which its speed is measured."""
-SAMPLES = 4
-"""Samples per pixel of a screenshot, which need not be fast."""
 
 
 class FilmClock:
@@ -216,7 +215,7 @@ def draw_screenshot(
     transparent: without a background. Raises DisplayError if the graphics card lacks the memory.
     """
     time, scene = session.transport.time, session.scene
-    target = Target(context, session.size, SAMPLES)
+    target = Target(context, session.size, Quality.FINE.samples)
     before = scene.switches["background"]
     try:
         if transparent:
@@ -226,8 +225,8 @@ def draw_screenshot(
         pictures = []
         for shown in views:
             target.begin()
-            within = renderer.draw(shown, camera, session.size)
-            pictures.append(read_pixels(target.finish(within=within), session.size))
+            renderer.draw(shown, camera, session.size, smoothed=target.smoothed)
+            pictures.append(read_pixels(target.finish(), session.size))
     finally:
         scene.show("background", before)
         target.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from enum import StrEnum
 from functools import cache
 
 from fba.parameters import FAP_COUNT, FIRST_LOW_LEVEL_FAP, fap_numbers, faps
@@ -15,6 +16,18 @@ Value = bool | str | int | None
 
 ON = ("on", "yes", "true", "1")
 OFF = ("off", "no", "false", "0", "none")
+
+
+class Quality(StrEnum):
+    """FAST pictures have edges smoothed along outlines, FINE ones several samples per pixel."""
+
+    FAST = "fast"
+    FINE = "fine"
+
+    @property
+    def samples(self) -> int:
+        """Samples per pixel; 0 is one, with edges smoothed afterwards."""
+        return 4 if self is Quality.FINE else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +116,12 @@ def _table() -> dict[str, Switch]:
 
 SWITCHES: Mapping[str, Switch] = _table()
 """All switches by name, in the order in which a panel lists them."""
+
+
+def samples_of(switches: Switches, usual: int) -> int:
+    """Return the samples per pixel that the switch "quality" asks for; `usual` for "auto"."""
+    quality = str(switches["quality"])
+    return usual if quality == "auto" else Quality(quality).samples
 
 
 class Switches(Mapping[str, Value]):

@@ -14,7 +14,7 @@ from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import DisplayError, FbaWarning
 from fba_player.export.render import film_rate
-from fba_player.gl._context import cure, import_moderngl
+from fba_player.gl._context import cure, import_moderngl, is_software
 from fba_player.gl._framebuffer import Readback, Target
 from fba_player.gl._renderer import Renderer
 from fba_player.playback._transport import Transport
@@ -26,6 +26,7 @@ from fba_player.session._session import Session
 from fba_player.session._source import Source
 from fba_player.view._camera import Camera
 from fba_player.view.protocols import Closing
+from fba_player.view.switches import Quality, samples_of
 from fba_player.window._display import Covering, FullScreen
 from fba_player.window._glfw_input import GlfwInput
 from fba_player.window._plain_overlay import Overlay
@@ -85,6 +86,7 @@ class Window(Closing):
         self._title = title or scene.title or "fba"
         self._shown_title = ""
         self._target: Target | None = None
+        self._samples = 0
         self._renderer: Renderer | None = None
         self._readback: Readback | None = None
         self._overlay: Overlay | None = None
@@ -224,6 +226,7 @@ class Window(Closing):
         rates = [glfw.get_video_mode(monitor).refresh_rate for monitor in glfw.get_monitors()]
         self._least = LEAST_SHARE / max([*rates, USUAL_RATE])
         self._renderer = Renderer(self._gl)
+        self._samples = (Quality.FAST if is_software(self._gl) else Quality.FINE).samples
 
     def _make_panels(self, panels: bool) -> None:
         """Make the panels, or the plain timeline in their place, and connect the input."""
@@ -263,17 +266,19 @@ class Window(Closing):
         session = self.session
         session.size, session.scale, session.full_screen = size, self._surface.scale, self._full_screen.active
         session.viewpoint.aspect = size[0] / size[1]
-        if self._target is None or self._target.size != size:
+        samples = samples_of(session.scene.switches, self._samples)
+        if self._target is None or (self._target.size, self._target.samples) != (size, samples):
             if self._target is not None:
                 self._target.close()
-            self._target = Target(self._gl, size, samples=0)
+            self._target = Target(self._gl, size, samples)
         assert self._renderer is not None
         session.exports.poll()
         self.captures.begin_picture()
         time = self.transport.time
         self._target.begin()
         gradual = wall.perf_counter() if session.recording is None else None  # films need no clock
-        within = self._renderer.draw(session.view(time), session.camera(time), size, gradual)
+        view, smoothed = session.view(time), self._target.smoothed
+        within = self._renderer.draw(view, session.camera(time), size, gradual, smoothed=smoothed)
         if self._renderer.morphing:
             self._pictures_due = max(self._pictures_due, 1)
         self._target.finish(self._gl.screen, within)

@@ -43,6 +43,16 @@ class TestPictures:
         assert shown.dtype == np.uint8
         assert (shown[..., 3] == 255).all()
 
+    def test_quality_is_fine_unless_the_scene_says_otherwise(self) -> None:
+        fine, fast = picture(still()), picture(still(), samples=0)
+        assert 20 < changed(fine, fast).sum() < 3000  # edges
+        for quality, expected in (("fine", fine), ("fast", fast)):
+            scene = Scene(still())
+            scene.show("quality", quality)
+            for samples in (0, 4):
+                with Offscreen(scene, (320, 240), samples=samples) as offscreen:
+                    np.testing.assert_array_equal(offscreen.frame(0.0), expected)
+
     def test_a_face_fills_the_middle_and_stands_upright(self) -> None:
         shown = picture(still(), camera="front").astype(int)
         red_over_blue = shown[..., 0] - shown[..., 2]

@@ -13,7 +13,7 @@ import pytest
 import graphics
 from fba.animation import Animation
 from fba.errors import DisplayError, FbaWarning
-from fba_player.gl._context import import_moderngl
+from fba_player.gl._context import import_moderngl, is_software
 from fba_player.gl._renderer import Renderer
 from fba_player.scene.scene import Scene
 from fba_player.window._play import play
@@ -322,6 +322,17 @@ def test_the_close_button_of_the_window_asks_if_work_is_unsaved(window: Window) 
     assert [notice.kind for notice in window.session.notices()] == ["warning"]
     glfw.set_window_should_close(window._window, True)
     assert not window.update()
+
+
+def test_a_window_is_fast_in_software_and_fine_where_it_is_told(plain: Window) -> None:
+    for quality in ("auto", "fine", "fast"):
+        plain.session.scene.show("quality", quality)
+        plain._redraw()
+        plain.update()
+        assert plain._target is not None
+        usual = 0 if is_software(plain._gl) else 4
+        assert plain._target.samples == {"auto": usual, "fine": 4, "fast": 0}[quality]
+        assert np.ptp(shown(plain)[..., :3]) > 100  # it arrives on the screen
 
 
 def test_a_paused_face_changes_its_level_of_detail_and_then_comes_to_rest(plain: Window) -> None:
