@@ -179,7 +179,8 @@ def _measure_parts(body: BodyModel, vertices: Float64, arm: Float64) -> Parts:
         centre = skeleton.centres[number]
         ends = [skeleton.centres[skeleton.number(low), 1] + above_low,
                 skeleton.centres[skeleton.number(high), 1] + above_high]  # fmt: skip
-        samples = _samples(vertices, body.triangles[chosen[body.triangles].all(axis=1)])
+        whole = chosen[body.triangles].all(axis=1)
+        samples = _samples(vertices, body.triangles[whole].astype(np.int64))
         samples = samples[(samples[:, 1] > ends[0]) & (samples[:, 1] < ends[1])] - centre
         if len(samples):
             ends = [end - centre[1] for end in ends]

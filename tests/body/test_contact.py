@@ -103,8 +103,8 @@ def test_hands_stay_outside_in_recordings(shared: Path, body: BodyModel, contact
 
 def test_a_smooth_motion_stays_smooth(body: BodyModel, contact: Contact) -> None:
     """An arm that brushes the thigh: in 120 steps of 0.7 degrees, no correction changes by more than 3."""
-    ends = [angles({"l_shoulder_abduct": -8, "l_shoulder_flexion": angle}) for angle in (-40, 45)]
-    swing = np.linspace(*ends, 120)
+    back, ahead = (angles({"l_shoulder_abduct": -8, "l_shoulder_flexion": angle}) for angle in (-40, 45))
+    swing = np.linspace(back, ahead, 120)
     turns = np.array([contact.keep_apart(joints) for joints in BapSolver(body.skeleton).pose(swing)])
     assert turns.any()
     assert np.degrees(np.linalg.norm(np.diff(turns, axis=0), axis=3)).max() < 3
