@@ -12,7 +12,7 @@ from fba.face import FaceModel
 from fba.face.simplification import simplify_face
 
 SIZE = (250, 300)
-FACES = (11651, 3728, 1193)
+FACES = (11807, 3690, 1107)
 POSES: tuple[dict[int, float], ...] = (
     {},
     {3: 900},

@@ -62,7 +62,7 @@ TEETH_SHARE = 0.3
 TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""
 OTHER_SHARE = 0.2
-"""The same for clothes and what else is worn."""
+"""The same for hair, clothes and what else is worn."""
 RIM_VERTICES = 16
 """Vertices of a pupil's rim that stay."""
 LEVEL_RATIO = 0.32
@@ -238,6 +238,7 @@ def _importance(model: FaceModel) -> Float64:
         ("lash", LASH_SHARE),
         ("teeth", TEETH_SHARE),
         ("tongue", TONGUE_SHARE),
+        ("hair", OTHER_SHARE),
         ("other", OTHER_SHARE),
     ):
         for part in model.of_kind(kind):

@@ -53,7 +53,7 @@ def cut_depth(ball: Float64, rest: Float64, moved: Float64) -> float:
             u, v, w = u + share * rest[i, 0], v + share * rest[i, 1], w + share * rest[i, 2]
         if (x - ball[0]) * ball[3] + (y - ball[1]) * ball[4] + (z - ball[2]) * ball[5] > 0.0:
             deepest = max(deepest, _depth(ball, x, y, z) - max(_depth(ball, u, v, w), 0.0))
-    return deepest / size
+    return float(deepest / size)
 
 
 @compiled

@@ -345,7 +345,7 @@ def _cost_alone(surface: Surface, scratch: Scratch) -> float:
         way = _distance(surface.places[corners[i], 0], surface.places[corners[(i + 1) % 3], 0])
         squared = max(squared, way * way)
     scratch.squared[0] = squared * squared
-    return surface.places.shape[1] * (1 - SURFACE_SHARE) / 2 * squared**3
+    return float(surface.places.shape[1] * (1 - SURFACE_SHARE) / 2 * squared**3)
 
 
 @compiled
