@@ -55,7 +55,7 @@ class _Given:
     )
     hair: Literal["keep", "none"] = option(
         default="keep",
-        help="The built-in hair where no photograph shows anything: keep it, or none for a bald head. "
+        help="The built-in hair where no photograph shows anything: keep it, or none, skin in its place. "
         "Default: keep.",
     )
     name: str | None = option(help="Name of the model. Default: the name of the frontal photograph.")

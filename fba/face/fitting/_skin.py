@@ -79,7 +79,7 @@ def paint(
     """Return (the model with the skin of the photographs, share of the face's skin that they show).
 
     The first photograph is the frontal one, a second the profile, which also serves the other side mirrored.
-    hair: whether the built-in hair stays where neither shows anything; otherwise skin takes its place.
+    hair: whether the built-in hair stays where neither shows anything; otherwise skin is where it was.
     """
     part = next((one for one in model.of_kind("skin") if one.texcoords is not None), None)
     if part is None:
