@@ -165,7 +165,10 @@ def test_what_a_texture_leaves_clear_is_seen_through() -> None:
     through = shown(camera, {}, model=replace(model, parts=(*model.parts, pane)))[0]
     left, right = (pixel(camera, (x, 0.03, 0.06)).round().astype(int) for x in (-0.03, 0.03))
     assert through[left[1], left[0], 2] > without[left[1], left[0], 2] + 20
-    np.testing.assert_array_equal(through[right[1], right[0]], without[right[1], right[0]])
+    # The light on the head alone is stored with it, rounded; on the head with a pane it is computed.
+    np.testing.assert_allclose(
+        through[right[1], right[0]].astype(int), without[right[1], right[0]].astype(int), atol=1
+    )
 
 
 def test_shoulders_stay_while_the_head_turns() -> None:
