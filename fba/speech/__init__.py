@@ -6,7 +6,7 @@ programs, and `perform` lets a face speak them.
 
 from fba.speech._alignment import find_speech
 from fba.speech._live import LiveSpeech
-from fba.speech._performance import Coding, encoder_options, perform
+from fba.speech._performance import Coding, encoder_options, enliven, perform
 from fba.speech._pieces import RATE
 from fba.speech._prosody import Prosody
 from fba.speech._sounds import Phone, Shape, Speech, Word, find_shapes
@@ -27,6 +27,7 @@ __all__ = [
     "VisemeFormat",
     "Word",
     "encoder_options",
+    "enliven",
     "find_shapes",
     "find_speech",
     "find_timings",

@@ -50,14 +50,12 @@ def perform(
     life: float = 0.5,
     prosody: Prosody | None = None,
     keep_goal: bool = True,
-    motion: Animation | None = None,
 ) -> Animation:
     """Return the animation of a face that speaks; players move it linearly between its frames.
 
     rate: frames in a second that can be sent. coding: visemes (FAP 1), or faps: low-level FAPs with
     coarticulation. style: from 0, mumbled, by 0.5 to 1, overarticulated; lips close in any style. life: 0 for
-    the mouth alone, to 1: nods, brows, blinks and glances. prosody: of the sound, if there is one. motion: of
-    a face that speaks already, at this rate; it is kept, and the rest is added to what it leaves still.
+    the mouth alone, to 1: nods, brows, blinks and glances. prosody: of the sound, if there is one.
 
     keep_goal: leave out small movements, and up to 40 % of the sounds, those that are missed least, where the
     mouth takes more than 200 bits a second as visemes, or 500 as low-level FAPs, as in short sentences.
@@ -68,8 +66,6 @@ def perform(
     check_share("life", life)
     shapes = find_shapes(speech.phones)
     added = find_life(speech, rate, life, prosody)
-    if motion is not None and coding == "faps":
-        return replace(motion, face=_with_life(_styled(motion, style), added, motion.index), body=None)
     keys = find_keys(shapes, rate)
     last = max(round(speech.seconds * rate), 1)
     if not keys or keys[0][0] > 0:
@@ -83,6 +79,30 @@ def perform(
     frames = {frame for frame, _ in mouth.keys} | {frame for frame in added.frames if frame <= last}
     index = np.array(sorted(frames), dtype=np.int64)
     return Animation(face=_with_life(mouth.face(index), added, index), body=None, rate=rate, index=index)
+
+
+def enliven(
+    motion: Animation,
+    speech: Speech,
+    *,
+    style: float = 0.5,
+    life: float = 0.5,
+    prosody: Prosody | None = None,
+) -> Animation:
+    """Return a face that speaks already, as one that was captured, in a style and with life.
+
+    motion: its FAPs are kept, larger or smaller by the style; life moves those that it leaves still. speech:
+    what it says. For the others see `perform`. Raises OptionError for a body, and for numbers outside of 0 to
+    1.
+    """
+    check_share("style", style)
+    check_share("life", life)
+    if motion.face is None:
+        raise OptionError("the motion is that of a body; give one of a face")
+    values = np.rint(motion.face.values * find_style(style).gains).astype(np.int32)
+    added = find_life(speech, motion.rate, life, prosody)
+    face = _with_life(replace(motion.face, values=values), added, motion.index)
+    return replace(motion, face=face, body=None)
 
 
 @dataclass(frozen=True)
@@ -142,13 +162,6 @@ def _within_goal(mouth: _Mouth, most: float) -> _Mouth:
         else:
             few = middle
     return mouth.without(order[:many])
-
-
-def _styled(motion: Animation, style: float) -> FaceTrack:
-    if motion.face is None:
-        raise OptionError("the motion is that of a body; give one of a face")
-    values = np.rint(motion.face.values * find_style(style).gains).astype(np.int32)
-    return replace(motion.face, values=values)
 
 
 def check_share(name: str, value: float) -> None:

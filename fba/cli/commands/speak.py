@@ -116,6 +116,10 @@ class _Manner:
         help="faps: low-level FAPs, each sound bent towards its neighbours, about 0.5 kbit/s. visemes: FAP "
         "1, about 0.2 kbit/s.",
     )
+    every_sound: bool = option(
+        default=False,
+        help="Leave out no sound of a short sentence to keep that rate: up to 0.3 and 0.8 kbit/s.",
+    )
     style: float = option(
         default=0.5, type=SHARE, show_default=True, help="From 0, mumbled, to 1, overarticulated."
     )
@@ -169,19 +173,22 @@ def command(
     outputs = Outputs(written, [said.audio, said.text_file, said.timings], no_clobber=no_clobber)
     text = _text(said)
     from fba.planning import encode
-    from fba.speech import encoder_options, perform
+    from fba.speech import encoder_options, enliven, perform
 
     motion = None if said.timings is None else _read_curves(said.timings, manner)
     spoken, prosody, voice = _find(said, text, sound, outputs, motion)
-    animation = perform(
-        spoken,
-        rate=manner.rate,
-        coding=manner.coding,
-        style=manner.style,
-        life=manner.life,
-        prosody=prosody,
-        motion=motion,
-    )
+    if motion is not None and manner.coding == "faps":
+        animation = enliven(motion, spoken, style=manner.style, life=manner.life, prosody=prosody)
+    else:
+        animation = perform(
+            spoken,
+            rate=manner.rate,
+            coding=manner.coding,
+            style=manner.style,
+            life=manner.life,
+            prosody=prosody,
+            keep_goal=not manner.every_sound,
+        )
     if moods:
         from fba.emotion import emote
 

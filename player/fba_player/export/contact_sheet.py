@@ -100,7 +100,7 @@ def tiles(kind: str, scene: Scene) -> list[Tile]:
     if kind == "proof":
         both = [*tiles("expressions", scene), *tiles("visemes", scene)]
         around = [replace(tile, yaw=yaw) for tile in both for yaw in (0.0, THREE_QUARTER)]
-        return [*(Tile(label, "", _faps(""), *view) for label, *view in VIEWS), *around]
+        return [*(Tile(label, "", _faps(""), view, yaw, pitch) for label, view, yaw, pitch in VIEWS), *around]
     definitions = scene.model.definitions
     if kind == "visemes":
         rows = zip(VISEMES[1:], definitions.visemes[1:], strict=True)

@@ -57,6 +57,17 @@ def test_timings_become_a_stream(coding: str, run: Run, timings: Path, tmp_path:
     assert bool(face.mask[:, 0].any()) == (coding == "visemes")
 
 
+def test_every_sound_is_kept_where_that_is_asked(run: Run, tmp_path: Path) -> None:
+    phones = ["HH", "AH", "L", "OW", "W", "ER", "L", "D", "AY", "S", "IY", "Y", "UW"]
+    dense = tmp_path / "dense.ctm"
+    dense.write_text("".join(f"it 1 {n * 0.08:.2f} 0.08 {name}\n" for n, name in enumerate(phones)))
+    frames = []
+    for more in ([], ["--every-sound"]):
+        assert run("speak", "--timings", dense, "--life", 0, *more, "-o", tmp_path / "it.fba").code == 0
+        frames.append(len(fba.read(tmp_path / "it.fba")))
+    assert frames[1] > frames[0]
+
+
 @pytest.mark.parametrize("suffix", ["json", "TextGrid"])
 def test_visemes_come_back(suffix: str, run: Run, timings: Path, tmp_path: Path) -> None:
     stream, written = tmp_path / "map.fba", tmp_path / f"map.{suffix}"
