@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.simplification import distances, place
+from bench.figures.simplification import distances, place
 
 from fba.compiled import is_compiled
 from fba.errors import ModelError
