@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.simplification import distances, place
 
+from bench.figures.simplification import distances, place
 from fba.compiled import is_compiled
 from fba.errors import ModelError
 from fba.face import Deformer, FaceModel

@@ -287,6 +287,20 @@ def test_the_full_mesh_lies_on_a_level() -> None:
     assert np.linalg.norm(on - vertices, axis=1).max() < 0.05
 
 
+@pytest.mark.parametrize("far", [np.nan, np.inf, 1e200, -1e300])
+def test_a_place_that_is_no_number_or_too_far_away_is_not_in_a_ball(far: float) -> None:
+    round_ball = np.array([0, 0, 0, 0, 0, 1, 2, 2, 2.0])
+    near = np.array([[3.0, 0, 1], [-3, 0, 1], [0, 3, 1]])
+    for beyond in (np.full((3, 3), far), near * (1, 1, far), np.where(np.eye(3) > 0, far, near)):
+        assert cut_depth(round_ball, near, beyond) == 0.0
+        assert 0.0 <= cut_depth(round_ball, beyond, near / 4) < 1.0
+
+
+def test_a_mesh_of_no_vertices_has_no_collapses() -> None:
+    made = simplify(np.zeros((2, 0, 3)), np.zeros((0, 3), dtype=np.int32), 1)
+    assert made.faces.shape == (0,)
+
+
 def test_edges_of_three_triangles_stay() -> None:
     vertices, triangles = patch(9)
     wall = vertices[:, [0, 2, 1]] * (1, 1, 0.5) + (0, 0.5, 0)  # stands on the middle row
@@ -314,7 +328,8 @@ def test_random_meshes_stay_meshes(seed: int) -> None:
     triangles = random.integers(0, count, (int(random.integers(1, 150)), 3))
     poses = np.stack([vertices, vertices + 0.1 * random.standard_normal((count, 3))])
     looks, lines = random.integers(0, 2, (count, 1)), random.integers(0, 8, count) * (seed % 2)
-    made = simplify(poses, triangles, 1, looks=looks, lines=lines)
+    balls = np.concatenate([vertices[0], [0, 0, 1, np.ptp(vertices) / 2], random.random(seed % 4 + 2)])
+    made = simplify(poses, triangles, 1, looks=looks, lines=lines, balls=balls)
     for step in range(len(made.faces) + 1):
         level = made.after(step)
         if len(level.triangles):
@@ -352,8 +367,15 @@ def test_a_single_triangle_and_a_tetrahedron_stay() -> None:
         (np.zeros((1, 3, 3)), [[0.0, 1, 2]], {}, "whole numbers"),
         (np.zeros((1, 3, 3)), [0, 1, 2], {}, "whole numbers"),
         (np.zeros((1, 3, 3)), [[0, 1, 2]], {"importance": np.ones(2)}, "importance must be 3 numbers"),
-        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": np.ones((1, 8))}, "rows of 9 finite numbers"),
-        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": np.zeros(9)}, "with a size"),
+        (np.full((1, 3, 3), 1e21), [[0, 1, 2]], {}, r"vertex 0 is at .* in pose 0, beyond 1e\+20"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"importance": np.full(3, np.nan)}, "importance must be 3"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"lines": np.full(3, np.inf)}, "lines must be 3 whole numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"lines": np.array([0, 0, -1])}, "lines must be 3 whole numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": np.ones((1, 8))}, "at least two radii"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": [0, 0, 0, 0, 0, 1, 0, 1, 1]}, "ball 0 .* its size"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": [0, 0, 0, 0, 0, 2, 1, 1, 1]}, "its gaze of length 1"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": [0, 0, 0, 0, 0, 1, 1, 1, -1]}, "no radius below 0"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": [0, 0, 0, 0, 0, 1, 1, 1, np.nan]}, "must be finite"),
         (np.zeros((1, 3, 3)), [[0, 1, 2]], {"importance": np.full(3, -1.0)}, "importance must be 3 numbers"),
         (np.zeros((1, 3, 3)), [[0, 1, 2]], {"looks": np.zeros((2, 2))}, "looks must have 3 rows"),
     ],

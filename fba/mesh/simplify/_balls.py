@@ -3,7 +3,8 @@
 A ball is a row of numbers: its centre (3), the direction in which it looks (3), its size, and its radius at
 equal steps of the angle from that direction, 0 to 180 degrees, as a cornea stands out.
 
-Bounds: rows have at least two radii; corners have shape (3, 3).
+Bounds: rows have at least two radii (`_memoryless.py` checks that); corners have shape (3, 3). An angle that
+is no number never becomes an index.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ def _depth(ball: Float64, x: float, y: float, z: float) -> float:
         return float(ball[6])
     cosine = (x * ball[3] + y * ball[4] + z * ball[5]) / away
     steps = math.acos(min(max(cosine, -1.0), 1.0)) / math.pi * (len(ball) - 8)
+    if not steps >= 0.0:  # NaN: too far away for squares
+        return -math.inf
     k = min(int(steps), len(ball) - 9)
     return float(ball[7 + k] + (steps - k) * (ball[8 + k] - ball[7 + k]) - away)
 

@@ -7,6 +7,7 @@ mesh in all its poses, so that what moves keeps its vertices. Borders and seams 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,8 @@ from fba.errors import ModelError
 
 WELD = 1e-7
 """Vertices within this share of the mesh's size are one vertex, if they are in every pose."""
+FARTHEST = 1e20
+"""Largest coordinate: products of more than ten lengths are to be finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,55 +156,28 @@ def simplify(
     onto one of their own vertices; all others move to where the volume at rest stays the same.
 
     Edges of more than two triangles stay. Where nothing can be collapsed, more triangles than asked for are
-    left. ModelError for shapes that do not agree, numbers not finite and triangles that name other vertices.
+    left. ModelError for shapes that do not agree, numbers not finite or beyond `FARTHEST`, and triangles that
+    name other vertices.
     """
     from fba.mesh.simplify import _memoryless_loops as loops
 
     places, corners = _check(poses, triangles)
-    count = places.shape[1]
-    size = max(float(np.ptp(places[0], axis=0).max(initial=0.0)), 1e-30)
-    flat = np.ascontiguousarray(places.transpose(1, 0, 2).reshape(count, -1))
-    points = _number_rows(np.round(flat / (size * WELD)))
-    given = np.zeros((count, 0)) if looks is None else np.asarray(looks, dtype=np.float64)
-    if given.ndim != 2 or len(given) != count:
-        raise ModelError(f"looks must have {count} rows, one for each vertex, not the shape {given.shape}")
-    wedges = _number_rows(np.concatenate([points[:, None], given], axis=1))
-    total = int(points.max(initial=-1)) + 1
+    points, wedges, parts = _number_vertices(places, looks)
+    total, number = (int(numbers.max(initial=-1)) + 1 for numbers in (points, wedges))
     whole = points[corners]
     proper = (whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])
     whole, sides = np.ascontiguousarray(whole[proper]), np.ascontiguousarray(wedges[corners[proper]])
-    parts = _number_rows(given[:, :1]) if given.shape[1] else np.zeros(count, np.int32)
     part = parts[corners[proper, 0]]
     kind = _kinds(whole, sides, total)
+    weight, through = _hold(kind, points, importance, lines)
     welded = np.empty((total, len(places), 3))
     welded[points] = places.transpose(1, 0, 2)
-    weight = np.ones(total)
-    if importance is not None:
-        factors = _per_vertex(importance, count, "importance")
-        weight[points] = factors
-        kind[points[np.isinf(factors)]] = loops.PINNED
-        weight[np.isinf(weight)] = 1.0
-    through = np.zeros(total, np.int64)
-    if lines is not None:
-        np.bitwise_or.at(through, points, _per_vertex(lines, count, "lines").astype(np.int64))
-        kind[(through > 0) & (kind == loops.ON_LINE)] = loops.PINNED  # where a line meets a border
-        kind[(through > 0) & (kind == loops.FREE)] = loops.ON_LINE
     surface = loops.Surface(
         welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
         kind, np.zeros(total, np.int64), weight, through, *_measure_lines(welded[:, 0], whole, through),
         part, np.bincount(part, minlength=1).astype(np.int32), _check_balls(balls),
     )  # fmt: skip
-    number = int(wedges.max(initial=-1)) + 1
-    history = loops.History(
-        np.zeros(total, np.int32), np.zeros((total, 3)), np.zeros(total, np.int32),
-        np.arange(total, dtype=np.int32), np.full(total, total, np.int32),
-        np.arange(number, dtype=np.int32), np.full(number, total, np.int32),
-    )  # fmt: skip
-    scratch = loops.Scratch(
-        np.empty(2 * loops.MAX_RING, np.int32), np.empty(4 * loops.MAX_RING + 4, np.int32),
-        np.empty((len(places), 13)), np.empty((3, 4)), np.empty(3), np.empty(1),
-        np.full(total, np.inf), np.zeros(total, np.int32),
-    )  # fmt: skip
+    history, scratch = _allocate(total, number, len(places))
     done = 0
     if total:
         _link(surface, scratch)
@@ -212,6 +188,70 @@ def simplify(
         places[0], corners, history.faces[:done].copy(), points, wedges, parts, history.kept[:done].copy(),
         history.place[:done].copy(), (history.onto, history.step), (history.wedge_onto, history.wedge_step),
     )  # fmt: skip
+
+
+def _number_vertices(places: Float64, looks: Floating | None) -> tuple[Int32, Int32, Int32]:
+    """Return (N,) three times: numbers of points, of wedges, points of one look, and of parts.
+
+    places: (K, N, 3). looks: as `simplify` takes them.
+    """
+    count = places.shape[1]
+    size = max(float(np.ptp(places[0], axis=0).max()) if count else 0.0, 1e-30)
+    flat = np.ascontiguousarray(places.transpose(1, 0, 2).reshape(count, 3 * len(places)))
+    points = _number_rows(np.round(flat / (size * WELD)))
+    given = np.zeros((count, 0)) if looks is None else np.asarray(looks, dtype=np.float64)
+    if given.ndim != 2 or len(given) != count:
+        raise ModelError(f"looks must have {count} rows, one for each vertex, not the shape {given.shape}")
+    wedges = _number_rows(np.concatenate([points[:, None], given], axis=1))
+    return points, wedges, _number_rows(given[:, :1]) if given.shape[1] else np.zeros(count, np.int32)
+
+
+def _hold(
+    kind: Int32, points: Int32, importance: Floating | None, lines: Integer | None
+) -> tuple[Float64, Int64]:
+    """Return (V,) twice: factors of the cost, and a bit for each line; write the kind of what they hold.
+
+    kind: (V,), by borders and seams. points: (N,). importance, lines: as `simplify` takes them.
+    """
+    from fba.mesh.simplify import _memoryless_loops as loops
+
+    weight, through = np.ones(len(kind)), np.zeros(len(kind), np.int64)
+    if importance is not None:
+        factors = np.asarray(importance, dtype=np.float64)
+        if factors.shape != points.shape or not (factors >= 0).all():
+            raise ModelError(
+                f"importance must be {len(points)} numbers that are not negative, one for each vertex"
+            )
+        weight[points] = factors
+        kind[points[np.isinf(factors)]] = loops.PINNED
+        weight[np.isinf(weight)] = 1.0
+    if lines is not None:
+        bits = np.asarray(lines)
+        if bits.shape != points.shape or bits.dtype.kind not in "iu" or (bits.astype(np.int64) < 0).any():
+            raise ModelError(
+                f"lines must be {len(points)} whole numbers from 0 to 2**63 - 1, one for each vertex"
+            )
+        np.bitwise_or.at(through, points, bits.astype(np.int64))
+        kind[(through > 0) & (kind == loops.ON_LINE)] = loops.PINNED  # where a line meets a border
+        kind[(through > 0) & (kind == loops.FREE)] = loops.ON_LINE
+    return weight, through
+
+
+def _allocate(vertices: int, wedges: int, poses: int) -> tuple[Any, Any]:
+    """Return the history and the scratch arrays of `_memoryless_loops` for these numbers."""
+    from fba.mesh.simplify import _memoryless_loops as loops
+
+    history = loops.History(
+        np.zeros(vertices, np.int32), np.zeros((vertices, 3)), np.zeros(vertices, np.int32),
+        np.arange(vertices, dtype=np.int32), np.full(vertices, vertices, np.int32),
+        np.arange(wedges, dtype=np.int32), np.full(wedges, vertices, np.int32),
+    )  # fmt: skip
+    scratch = loops.Scratch(
+        np.empty(2 * loops.MAX_RING, np.int32), np.empty(4 * loops.MAX_RING + 4, np.int32),
+        np.empty((poses, 13)), np.empty((3, 4)), np.empty(3), np.empty(1),
+        np.full(vertices, np.inf), np.zeros(vertices, np.int32),
+    )  # fmt: skip
+    return history, scratch
 
 
 def _link(surface: Any, scratch: Any) -> None:
@@ -302,19 +342,18 @@ def _on_triangles(points: Floating, corners: Floating) -> tuple[Float64, Float64
     return shares, np.einsum("ij,ij->i", off, off)
 
 
-def _per_vertex(values: Floating | Integer | Bool, count: int, what: str) -> Float64:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape != (count,) or np.isnan(array).any() or (array < 0).any():
-        raise ModelError(f"{what} must be {count} numbers that are not negative, one for each vertex")
-    return array
-
-
 def _check(poses: Floating, triangles: Integer) -> tuple[Float64, Int32]:
     places, corners = np.array(poses, dtype=np.float64), np.asarray(triangles)
     if places.ndim != 3 or places.shape[2] != 3 or not len(places):
         raise ModelError(f"poses must have shape (K, N, 3), at least one, not {places.shape}")
     if not np.isfinite(places).all():
         raise ModelError("a vertex has a position that is not finite")
+    if np.abs(places).max(initial=0.0) > FARTHEST:
+        pose, number, _ = (int(at) for at in np.argwhere(np.abs(places) > FARTHEST)[0])
+        raise ModelError(
+            f"vertex {number} is at {places[pose, number].tolist()} in pose {pose}, beyond {FARTHEST:g}; "
+            "give positions in metres"
+        )
     if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
         raise ModelError(f"triangles must be whole numbers, (F, 3), not {corners.dtype} {corners.shape}")
     if corners.size and not 0 <= corners.min() <= corners.max() < places.shape[1]:
@@ -324,8 +363,18 @@ def _check(poses: Floating, triangles: Integer) -> tuple[Float64, Int32]:
 
 def _check_balls(balls: Floating | None) -> Float64:
     rows = np.zeros((0, 9)) if balls is None else np.array(balls, dtype=np.float64, ndmin=2)
-    if rows.ndim != 2 or rows.shape[1] < 9 or not np.isfinite(rows).all() or not (rows[:, 6] > 0).all():
-        raise ModelError(f"balls must have rows of 9 finite numbers or more, with a size, not {rows.shape}")
+    if rows.ndim != 2 or rows.shape[1] < 9:
+        raise ModelError(
+            "balls must be rows of 9 numbers or more, a centre, a gaze, a size and at least two radii, "
+            f"not an array of shape {rows.shape}"
+        )
+    for number, row in enumerate(rows):
+        is_unit = abs(math.hypot(*row[3:6]) - 1.0) < 1e-6
+        if not (np.isfinite(row).all() and is_unit and row[6] > 0 and (row[7:] >= 0).all()):
+            raise ModelError(
+                f"ball {number} is {row.tolist()}; its numbers must be finite, its gaze of length 1, its "
+                "size above 0, and no radius below 0"
+            )
     return np.ascontiguousarray(rows)
 
 

@@ -178,7 +178,7 @@ def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]
 
 
 def body_shape(part: BodyPart, joints: int, stored: dict[str, Any]) -> FaceShape:
-    """Return the constant data of a part of a body with so many joints. stored: what `load_baked` returns."""
+    """Return the constant data of a part of a body. joints: their number. stored: of `load_baked`."""
     shape = make_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
     # Vertices must remain where joints bend the body: preserve the weights, in a few fixed projections.
     random = np.random.default_rng(7).standard_normal((joints, WEIGHT_PROJECTIONS)) / WEIGHT_PROJECTIONS**0.5

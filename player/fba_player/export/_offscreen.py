@@ -100,7 +100,7 @@ class Offscreen(Closing):
         return [self._read(other, camera, samples).copy() for other in views]
 
     def _target(self, samples: int) -> Target:
-        """Return the framebuffer with so many samples a pixel."""
+        """Return the framebuffer with this number of samples a pixel."""
         if samples not in self._targets:
             self._targets[samples] = Target(self._gl, self.size, samples)
         return self._targets[samples]
