@@ -17,9 +17,7 @@ GUM = np.array([0.52, 0.165, 0.145])
 TONGUE = np.array([0.50, 0.170, 0.155])
 TONGUE_UNDER = np.array([0.34, 0.09, 0.09])
 HALF_WIDTH, DEPTH = 0.0272, 0.0400
-"""Half axes of the outer edge of the upper arch of teeth, metres."""
-SQUARENESS = 2.4
-"""Its exponent: 2 would be half an ellipse, more is squarer at the canines."""
+"""Half axes of the outer edge of the upper arch of teeth, half an ellipse, metres."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
 AROUND = 12
@@ -60,14 +58,12 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
 def _arch(length: float, inset: float) -> tuple[Float64, float]:
     """Return position (3,) from the front, and turn about y, at a length along the arch from its middle."""
     angle = np.linspace(0, np.pi / 2, 400)
-    power = 2 / SQUARENESS
-    x, z = (HALF_WIDTH - inset) * np.sin(angle) ** power, -DEPTH * (1 - np.cos(angle) ** power) - inset
+    x, z = (HALF_WIDTH - inset) * np.sin(angle), -DEPTH * (1 - np.cos(angle)) - inset
     run = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
     beyond = max(length - run[-1], 0.0)
     px, pz = np.interp(length, run, x), np.interp(length, run, z) - beyond
-    turn = np.arctan2(-np.gradient(z, run), np.gradient(x, run))
-    turn[0] = 0.0  # on the midline
-    return np.array([px, 0.0, pz]), float(np.interp(length, run, turn))
+    tangent = np.interp(length, run, angle)
+    return np.array([px, 0.0, pz]), float(np.arctan2(DEPTH * np.sin(tangent), HALF_WIDTH * np.cos(tangent)))
 
 
 def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
