@@ -20,7 +20,9 @@ from typing import Any
 
 import numba
 from numba.core.caching import FunctionCache, NullCache
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
+from numba.cpython import hashing  # noqa: F401  # names the symbols that machine code may refer to
 
 from fba import __version__
 from fba.atomic import atomic
@@ -57,7 +59,9 @@ class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types here
             # A file with the right digest was made by the same versions of everything, and should load. If it
             # does not, for whatever reason, the function is compiled.
             with contextlib.suppress(Exception):
-                loaded = self._numba.load_overload(signature, target)
+                # Numba's `load_overload` first loads all that it can compile, which takes longer than the rest.
+                rtsys.initialize(target)
+                loaded = self._numba._load_overload(signature, target)
         if loaded is None:
             self._before_compiling()
         return loaded

@@ -1,4 +1,4 @@
-"""The study of losses: `python -m bench.loss`, shortened."""
+"""The study of losses: `python -m bench.codec.loss`, shortened."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from bench import loss
+from bench.codec import loss
 from fba import Animation, FbaWarning, decode
 from tools import synthetic_motion as motion
 

@@ -5,9 +5,9 @@ python -m tools.figure_checks [--figure NAME] [--only mouth|lids|inside|hands]..
 mouth: pictures of the person, 360, 720 and 1080 lines high, show neither background nor the inside of the
 mouth between lips that a stream closes. lids: closed lids meet within 0.2 mm. inside: tongue, teeth and
 walls of the mouth pass through no skin, over all FAPs in steps, lips closed and open, and over frames of the
-streams. hands: are outside the thighs. Without files, the samples and the shared recordings (FBA_SHARED,
-else ../shared beside the checkout) are taken, for hands the samples. It prints each finding, and ends with 1
-where there is one.
+streams. hands: are shown outside the thighs. Without files, the samples and the shared recordings
+(FBA_SHARED, else ../shared beside the checkout) are taken. It prints each finding, and ends with 1 where
+there is one.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import fba
 from fba import figures
 from fba.animation import Animation
 from fba.arrays import Bool, Float32, Float64, Intp
-from fba.body import BodyModel, GroundedPoser
+from fba.body import BodyModel
 from fba.face import Deformer, FaceModel, resolve
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.macros import open_mouth
@@ -36,11 +36,13 @@ from fba.parameters import BAP_COUNT, FAP_COUNT, faps, point_rows
 from fba.player import Offscreen, Scene
 from fba.tracks import BodyTrack, FaceTrack
 from fba_player._figure.face import FaceFigure, build_figure
+from fba_player._figure.posing import FigurePoser
 from fba_player.playback._timeline import Timeline
+from fba_player.view.switches import Switches
 
 SAMPLES = Path(fba.__file__).parent / "samples"
 SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[2] / "shared")
-RECORDINGS = ("vectors/real/*.fba", "data/xface/*.fap", "data/vreng/*.?ap", "data/ist/*")
+RECORDINGS = ("vectors/real/*.fba", "data/xface/*.fap", "data/vreng/*.?ap", "data/ist/*", "data/greta/*.bvh")
 LINES = (360, 720, 1080)
 VIEWS = ((0.0, 0.0), (25.0, 0.0), (-35.0, 15.0), (60.0, 0.0))
 """Yaw and pitch of the camera, degrees."""
@@ -60,10 +62,10 @@ STEPS = 9
 """Values tried of each FAP."""
 REACH = {2: 400, 3: 10**6, 4: 1080, 5: 400, 6: 1080, 7: 10**6, 8: 400, 9: 1080, 10: 1080}
 """Largest value tried of a FAP, by group: as far as faces go."""
-HAND_DEPTH, THIGH_REACH = 0.001, 0.1
+HAND_DEPTH, THIGH_REACH = 0.002, 0.1
 """Depth in a thigh that counts, and the distance from its skin within which it is known, metres."""
 
-HAND_FRAMES = 200
+HAND_FRAMES = 60
 """Frames of a body that are looked at, at most."""
 Named = list[tuple[str, Float32]]
 """Resolved FAPs (68,), each with a name."""
@@ -287,12 +289,12 @@ def hand_depths(body: BodyModel, joints: Float64) -> tuple[float, int]:
 
 
 def check_hands(body: BodyModel, animations: dict[str, Animation]) -> Iterator[str]:
-    """Yield the animations whose hands are in the thighs, with the worst frame."""
-    poser = GroundedPoser(body.skeleton)
+    """Yield the animations whose hands are shown in the thighs, with the worst frame."""
+    poser, switches = FigurePoser(body, "iso"), Switches()
     for name, animation in animations.items():
         frames = np.unique(np.linspace(0, len(animation) - 1, HAND_FRAMES).astype(int))
         _, baps = Timeline(animation).many([float(animation.index[k] / animation.rate) for k in frames])
-        depths, counts = np.array([hand_depths(body, poser.pose(row)) for row in baps]).T
+        depths, counts = np.array([hand_depths(body, poser.pose(row, switches)) for row in baps]).T
         if counts.any():
             worst = frames[depths.argmax()]
             yield f"{name}: hands in thighs in {(counts > 0).sum()} of {len(frames)} frames, by up to " + (
@@ -337,11 +339,7 @@ def main(arguments: list[str] | None = None) -> int:
         if one.face is not None
     }
     closed, frames = choose_frames(checked, faces, given.frames)
-    bodies = {
-        path.name: streams[path.name]
-        for path in files
-        if streams[path.name].body is not None and (given.files or path.parent == SAMPLES)
-    }
+    bodies = {name: one for name, one in streams.items() if one.body is not None}
     checks = {
         "mouth": (f"{len(closed)} streams", check_mouth(checked, closed)),
         "lids": ("closed in 5 ways", check_lids(checked)),

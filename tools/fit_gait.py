@@ -1,9 +1,9 @@
 """Fit the corrections of the normal walk to measured people: `python tools/fit_gait.py [ROUNDS]`.
 
 Writes the rows of `normal` in `fba/body/gait/corrections.csv`. Hip, knee and ankle of a leg that swings are
-to be within one standard deviation of Winter's means (`docs/make_gait_curves.py` reads them), and to speed up
-and slow down as people's do; neither knee nor ankle is jerked. A leg that stands is left to the poses: there,
-feet that do not slip decide.
+to be within one standard deviation of Winter's means (`docs/pictures/gait_curves.py` reads them), and to
+speed up and slow down as people's do; neither knee nor ankle is jerked. A leg that stands is left to the
+poses: there, feet that do not slip decide.
 """
 
 from __future__ import annotations

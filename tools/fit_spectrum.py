@@ -2,8 +2,8 @@
 
 Voices of flite speak random words of the dictionary in pocketsphinx, as they are, in noise, and as over a
 telephone; flite says when each phone is. A linear discriminant with one covariance for all visemes separates
-them. Prints which part of hundredths of a second is right in the sentences of `bench.spoken`, spoken by each
-voice, with weights of the other voices. --write replaces `fba/speech/spectrum.csv`.
+them. Prints which part of hundredths of a second is right in the sentences of `bench.speech.spoken`, spoken
+by each voice, with weights of the other voices. --write replaces `fba/speech/spectrum.csv`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from bench.speech import add_noise, telephone, visemes  # noqa: E402
-from bench.spoken import FLITE, KNOWN, speak  # noqa: E402
+from bench.speech.spoken import FLITE, KNOWN, speak  # noqa: E402
 from fba.arrays import Float64, Int16, Int64  # noqa: E402
 from fba.audio import read_mono  # noqa: E402
 from fba.speech import RATE, Phone, find_shapes  # noqa: E402

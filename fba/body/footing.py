@@ -113,7 +113,8 @@ class GroundedPoser:
         """Return joint matrices, see `BapSolver.pose`."""
         matrices = self._solver.pose(baps)
         frames = matrices.reshape(-1, *matrices.shape[-3:])
-        frames[:, :, 1, 3] += self.lifts(baps)[:, None]
+        if self._default is not None:
+            frames[:, :, 1, 3] += _lifts(self._default, baps, self._solver.skeleton, frames)[:, None]
         return matrices
 
     def lifts(self, baps: npt.ArrayLike) -> Float64:
@@ -121,9 +122,13 @@ class GroundedPoser:
         rows = np.atleast_2d(np.asarray(baps))
         if self._default is None:
             return np.zeros(len(rows))
-        wanted, present = (
-            lowest_sole(solver.skeleton, solver.pose(rows)) for solver in (self._default, self._solver)
-        )
-        assert wanted is not None
-        assert present is not None
-        return wanted - present
+        return _lifts(self._default, rows, self._solver.skeleton, self._solver.pose(rows))
+
+
+def _lifts(default: BapSolver, baps: npt.ArrayLike, skeleton: Skeleton, matrices: Float64) -> Float64:
+    """Return metres (T,) by which the poses (T, J, 4, 4) of a skeleton are raised to those of the default."""
+    wanted = lowest_sole(default.skeleton, default.pose(np.atleast_2d(np.asarray(baps))))
+    present = lowest_sole(skeleton, matrices)
+    assert wanted is not None
+    assert present is not None
+    return wanted - present

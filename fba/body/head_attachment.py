@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,18 +76,21 @@ class AttachedHead:
         relative to the pose that BAPs give the skull base.
         """
         turned: Float64 = np.array(matrices, dtype=np.float64)
-        within = self.place @ np.asarray(turn, dtype=np.float64) @ np.linalg.inv(self.place)
-        if np.array_equal(within, np.eye(4)):
+        if np.array_equal(turn, np.eye(4)):
             return turned
-        skull, below = turned[self.skull], list(self.below)
-        motion = skull @ np.linalg.inv(self.skull_bind) @ within @ self.skull_bind @ np.linalg.inv(skull)
+        frame, below = self.frame(turned), list(self.below)
+        motion = frame @ np.asarray(turn, dtype=np.float64) @ np.linalg.inv(frame)
         turned[below] = motion @ turned[below]
         return turned
 
     def frame(self, matrices: npt.ArrayLike) -> Float64:
         """Return the matrix (4, 4) from the face's frame to the world, for parts that move with the skull."""
-        skull = np.asarray(matrices, dtype=np.float64)[self.skull]
-        return np.asarray(skull @ np.linalg.inv(self.skull_bind) @ self.place)
+        return np.asarray(np.asarray(matrices, dtype=np.float64)[self.skull] @ self._in_skull)
+
+    @cached_property
+    def _in_skull(self) -> Float64:
+        """(4, 4): from the face's frame to that of the skull's joint."""
+        return np.asarray(np.linalg.inv(self.skull_bind) @ self.place)
 
     def skin(
         self,

@@ -72,8 +72,9 @@ class OwnHead:
         if not self.shapes or not values.any():
             return np.zeros(len(self.shapes))
         key = values.tobytes()
-        if self._last and self._last[0][0] == key:
-            return self._last[0][1]
+        for last, weights in self._last:  # one, if any; other threads may replace it meanwhile
+            if last == key:
+                return weights
         scales, matrix = self.mixing
         count, reached = len(self.shapes), values * scales
         chosen = nnls(matrix, np.concatenate([reached, np.full(count, -FEW_WEIGHT / SMALL_WEIGHT)]))[0] > 0

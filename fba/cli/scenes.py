@@ -112,7 +112,8 @@ class SceneOptions(Reading):
         multiple=True,
         metavar="SWITCH[=VALUE]",
         help="What else is shown; repeatable: wireframe, points, influence=FAP, skeleton[=only], grid, "
-        "normals; shadows, wrinkles, eyes, teeth, hair=off; background=grey or transparent.",
+        "normals; shadows, wrinkles, contact, relaxed, eyes, teeth, hair=off; background=grey or "
+        "transparent.",
     )
     lod: Literal["auto", "full", "0", "1", "2", "3", "4"] | None = option(
         help="Level of detail of faces: by their size in pixels (default), or one of those that the model "

@@ -101,6 +101,7 @@ class Encoder:
         self._last_intra = 0  # index of the last I plane
         self._checks = PeriodChecks()
         self._finished = False
+        self._planned = False  # range lists without a parameter, markers alone, are left out
 
     def expect(self, animation: Animation) -> None:
         """Begin with ranges that include the values and changes of an animation, in place of the standard's.
@@ -142,6 +143,7 @@ class Encoder:
             for part, ranges in fitting_ranges(animation[:1], self.options).items():
                 self._ranges[part].codes[:2] = ranges.codes[:2]
         self._resumable = set()  # as after a start code: the next plane is an I plane
+        self._planned = True
         return first + self._push_all(animation[1:])
 
     def begin_segment(self, expected: Animation, options: EncoderOptions | None = None) -> None:
@@ -427,6 +429,8 @@ class Encoder:
         in_force = self._writer.settings_in_force(part)
         new_mask = in_force is None or not np.array_equal(in_force.mask, mask)
         send = ranges.changed or new_mask or options.start_codes
+        if self._planned and not mask[2 * (part == slots.FACE_BIT) :].any():  # FAP 1 and 2 have no ranges
+            send = False
         ranges.changed = False
         return PartSettings(
             run.mask_types[part],

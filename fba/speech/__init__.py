@@ -11,7 +11,7 @@ from fba.speech._pieces import RATE
 from fba.speech._prosody import Prosody
 from fba.speech._sounds import Phone, Shape, Speech, Word, find_shapes
 from fba.speech._text import split_text
-from fba.speech._timings import read_timings
+from fba.speech._timings import find_timings, read_timings
 from fba.speech._viseme_files import VisemeFormat, format_visemes
 from fba.speech._visemes import read_shapes
 from fba.speech._voices import speak_text
@@ -29,6 +29,7 @@ __all__ = [
     "encoder_options",
     "find_shapes",
     "find_speech",
+    "find_timings",
     "format_visemes",
     "perform",
     "read_shapes",

@@ -28,8 +28,11 @@ ROUNDED, AHEAD_FALL = (13, 14), 8.0
 """Visemes that round the lips, and how slowly their pull on the lips rises before them."""
 REST_PULL = 0.06
 """Pull towards the neutral face, everywhere."""
-CLOSURES = {1: 0.020, 2: 0.010}
-"""Visemes at which lips, or lip and teeth, must meet, and seconds from the centre within which they do."""
+CLOSURES = {1: 0.020, 2: 0.010, 3: 0.010}
+"""Visemes at which lips, lip and teeth, or tongue and teeth must meet; seconds on each side of the centre for
+which they do."""
+TONGUE_BETWEEN_TEETH = 3
+"""The viseme whose closure leaves it to its neighbours whether lips are rounded or spread."""
 RELEASE = 0.035
 """Seconds before and after that within which the lips part."""
 
@@ -48,6 +51,11 @@ class Style:
         for name, gain in (("jaw", self.jaw), ("lips", self.lips)):
             if not 0 <= gain <= 2:
                 raise OptionError(f"style: the gain of {name} must lie in 0..2, not {gain}")
+
+    @property
+    def gains(self) -> Float64:
+        """Of each FAP (68,)."""
+        return np.where(_columns("rounding"), self.lips, np.where(_columns("jaw"), self.jaw, 1.0))
 
 
 def find_style(clarity: float) -> Style:
@@ -82,7 +90,7 @@ def coarticulate(
     moved = table.any(axis=0)
     values = _blend(shapes, rate, count, table)
     _close(values, shapes, rate, table)
-    result = np.where(_columns("rounding"), style.lips, np.where(_columns("jaw"), style.jaw, 1.0)) * values
+    result = style.gains * values
     closed = _closures(shapes, rate, count)
     result = result + (values - result) * closed[:, None]
     mask = np.zeros((count, FAP_COUNT), dtype=bool)
@@ -125,11 +133,14 @@ def _closures(shapes: Sequence[Shape], rate: Fraction, count: int) -> Float64:
 
 
 def _close(values: Float64, shapes: Sequence[Shape], rate: Fraction, table: Float32) -> None:
-    """Let lips meet at the closures, whatever their neighbours want. The nearest frame is always closed."""
+    """Let lips, teeth and tongue meet at closures, whatever is beside them. The nearest frame is closed."""
     for shape in shapes:
         for first, weights in _closure_frames(shape, rate, len(values)):
             part = values[first : first + len(weights)]
-            part += weights[:, None] * (table[shape.viseme] - part)
+            change = weights[:, None] * (table[shape.viseme] - part)
+            if shape.viseme == TONGUE_BETWEEN_TEETH:
+                change[:, _columns("rounding")] = 0
+            part += change
 
 
 def _closure_frames(shape: Shape, rate: Fraction, count: int) -> list[tuple[int, Float64]]:

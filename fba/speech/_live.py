@@ -14,7 +14,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float64, Int16
 from fba.errors import OptionError, UnsupportedError
-from fba.speech._alignment import FRAME, is_silent, recogniser_of_phones
+from fba.speech._alignment import FRAME, LEAD, is_silent, recogniser_of_phones
 from fba.speech._coarticulation import coarticulate, find_style
 from fba.speech._life import LiveLife
 from fba.speech._performance import check_share, with_outer_lips
@@ -180,7 +180,7 @@ class _Recogniser:
         """Begin an utterance with what was heard last."""
         self._decoder.start_utt()
         self._set_mean()
-        self._origin = self._heard / RATE - RUN_UP
+        self._origin = self._heard / RATE - RUN_UP + LEAD
         self._decoder.process_raw(self._recent.tobytes())
 
     def _set_mean(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 import unicodedata
 from dataclasses import dataclass
@@ -51,7 +52,8 @@ def _lookup(phone: str, table: dict[str, tuple[str, ...]]) -> list[tuple[str, st
 
 
 def split_text(text: str, language: str = ENGLISH) -> list[Pronounced]:
-    """Return the words of a text as they are spoken. Markup in angle brackets is left out.
+    """Return the words of a text as they are spoken. Markup in angle brackets is left out,
+    and `&amp;` and its like are the characters that they stand for.
 
     language: as gruut names it: en-us, de-de, fr-fr. With gruut, numbers and abbreviations become words.
 
@@ -60,13 +62,13 @@ def split_text(text: str, language: str = ENGLISH) -> list[Pronounced]:
     """
     if len(text) > MOST_LETTERS:
         raise FormatError(f"the text has {len(text)} letters; {MOST_LETTERS} can be spoken at once")
-    text = re.sub(r"<[^<>]*>", " ", text)
+    text = html.unescape(re.sub(r"<[^<>]*>", " ", text))
     _check_script(text, language)
     words = _split_by_gruut(text, language)
     if words is None:
         words = _split_plainly(text, language)
     if not words:
-        raise FormatError("the text has no words")
+        raise FormatError("the text has no words; give what is spoken, or leave the text out")
     return words
 
 

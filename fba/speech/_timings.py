@@ -7,10 +7,15 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
+from fba.animation import Animation
 from fba.atomic import PathLike
 from fba.errors import FormatError
+from fba.face import Definitions
 from fba.source import naming_file, open_source
 from fba.speech._mouth_cues import (
     Entry,
@@ -29,6 +34,8 @@ MOST_BYTES = 1 << 26
 MOST_HEADER = 4096
 """Characters of the titles of a table's columns."""
 MOST_SECONDS = 100 * 3600.0
+SIZES = (1.0, 0.75, 0.5)
+"""Of visemes with which a mouth is compared."""
 
 
 def read_timings(path: PathLike) -> Speech:
@@ -47,8 +54,8 @@ def read_timings(path: PathLike) -> Speech:
                 return _order(_parse(parse, text), kind)
     if "jawopen" in text[:MOST_HEADER].lower():
         raise FormatError(
-            f"holds ARKit's curves, the motion of a face rather than timings: fba encode {path} -o OUT.fba "
-            "encodes them",
+            "holds ARKit's curves, the motion of a face rather than timings: `fba speak` takes them, and so does "
+            "perform as the motion that fba.read makes of them",
             path=path,
         )
     raise FormatError(
@@ -95,6 +102,25 @@ def _order(entries: list[Entry], kind: str) -> Speech:
             phones.append(Phone(name, start, end))
         before = end
     return Speech(tuple(phones), (), before)
+
+
+def find_timings(motion: Animation) -> Speech:
+    """Return the phones that the mouth of a captured face is most like, fully or less strongly.
+
+    A mouth is bent towards the sounds around, so that most are not the ones that were meant.
+
+    Raises FormatError for an animation without a face.
+    """
+    if motion.face is None:
+        raise FormatError("the motion is that of a body, not of a face")
+    table = Definitions.default().visemes
+    alike, squares = motion.face.values @ table.T, np.square(table).sum(axis=1)
+    nearest = np.argmin(np.min([size**2 * squares - 2 * size * alike for size in SIZES], axis=0), axis=1)
+    starts = np.flatnonzero(np.diff(nearest, prepend=-1))
+    times = [*(motion.index[starts] / float(motion.rate)), float((motion.index[-1] + 1) / motion.rate)]
+    names = [PHONES[number] for number in nearest[starts]]
+    phones = (Phone(name, start, end) for name, (start, end) in zip(names, pairwise(times), strict=True))
+    return Speech(tuple(phones), (), times[-1])
 
 
 PHONES = (SILENCE, "P", "F", "TH", "T", "K", "CH", "S", "L", "R", "AA", "EH", "IH", "AO", "UH")

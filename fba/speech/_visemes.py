@@ -10,11 +10,14 @@ from itertools import pairwise
 import numpy as np
 
 from fba.animation import Animation
+from fba.arrays import Float64, Int64
 from fba.speech._sounds import Shape
 
 MOST_BLEND = 63
 CLOSED = (1, 2)
 """Visemes at which the lips, or lip and teeth, meet."""
+KEPT = (*CLOSED, 3)
+"""Visemes that are not left out to save bits: these, and the tongue between the teeth."""
 LONG = 0.22
 """Seconds from which a viseme is held: it has a key frame at its begin and at its end."""
 INSET = 0.06
@@ -50,6 +53,45 @@ def find_keys(shapes: Sequence[Shape], rate: Fraction) -> list[tuple[int, Shape]
         if free >= APART * rate or (rank[0] and free > 0):
             keys.append((frame, shape, rank))
     return [(frame, shape) for frame, shape, _ in keys]
+
+
+def rank_keys(keys: Sequence[tuple[int, Shape]], rows: Float64) -> list[int]:
+    """Return the keys that may be left out, as their numbers, the ones that are missed least first.
+
+    rows: float (K, columns), what the mouth shows at each. A key is missed by how far a straight line between
+    its neighbours passes it, times the time between them. First and last, closures, what lies between two of
+    them, and the tongue between the teeth stay.
+    """
+    closed = [shape.viseme in CLOSED for _, shape in keys]
+    inner = range(1, len(keys) - 1)
+    free = [
+        at in inner and keys[at][1].viseme not in KEPT and not (closed[at - 1] and closed[at + 1])
+        for at in range(len(keys))
+    ]
+    times = np.array([frame for frame, _ in keys], dtype=np.float64)
+    before, after = np.arange(len(keys)) - 1, np.arange(len(keys)) + 1
+
+    links = times, rows, before, after
+    cost = np.array([_missed(at, *links) if free[at] else np.inf for at in range(len(keys))])
+    order: list[int] = []
+    while cost.size and np.isfinite(cost.min()):
+        at = int(cost.argmin())
+        order.append(at)
+        cost[at] = np.inf
+        first, last = int(before[at]), int(after[at])
+        after[first], before[last] = last, first
+        for near in (first, last):
+            if free[near]:
+                cost[near] = _missed(near, *links)
+    return order
+
+
+def _missed(at: int, times: Float64, rows: Float64, before: Int64, after: Int64) -> float:
+    """Return how much a key would be missed between the neighbours that it has. before, after: int64 (K,)."""
+    first, last = int(before[at]), int(after[at])
+    share = (times[at] - times[first]) / (times[last] - times[first])
+    line = (1 - share) * rows[first] + share * rows[last]
+    return float(np.linalg.norm(rows[at] - line) * (times[last] - times[first]))
 
 
 def nearest_blend(share: float) -> int:

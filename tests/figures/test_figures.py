@@ -59,7 +59,8 @@ def test_levels_of_detail_come_along(name: str) -> None:
 def _median_distance(face: FaceModel, level: DetailLevel) -> float:
     """Return how far (m) vertices of a face are from the surface of its level."""
     coarse = level.model.vertices.astype(np.float64)
-    mesh = Level(coarse, level.model.triangles, level.parents, *[np.zeros((0, 3), np.int32)] * 3)
+    gone = np.zeros(len(face.vertices), dtype=bool)
+    mesh = Level(coarse, level.model.triangles, level.parents, *[np.zeros(0, np.int32)] * 3, gone)
     rows, weights = place_on_level(face.vertices, mesh)
     off = np.einsum("nk,nkd->nd", weights, coarse[rows]) - face.vertices
     return float(np.median(np.linalg.norm(off, axis=1)))

@@ -9,6 +9,7 @@ import pytest
 from fba.compiled import is_compiled
 from fba.errors import ModelError
 from fba.mesh.simplify import Level, place_on_level, simplify
+from fba.mesh.simplify._balls import cut_depth
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="too slow without numba")
 Float64 = npt.NDArray[np.float64]
@@ -137,7 +138,7 @@ def test_pinned_vertices_stay_where_they_are() -> None:
     vertices, triangles = ball()
     pinned = np.zeros(len(vertices), dtype=bool)
     pinned[::29] = True
-    level = simplify(vertices[None], triangles, 80, pinned=pinned).level(80)
+    level = simplify(vertices[None], triangles, 80, importance=np.where(pinned, np.inf, 1)).level(80)
     np.testing.assert_array_equal(level.positions[level.parents[pinned]], vertices[pinned])
     np.testing.assert_allclose(level.carry(vertices)[level.parents[pinned]], vertices[pinned], atol=1e-12)
 
@@ -166,7 +167,7 @@ def test_lines_stay_the_shortest_way(seed: int) -> None:
     for bit, way in enumerate(ways):
         lines[way] |= 1 << bit
         pinned[way[[0, -1]]] = True
-    made = simplify(vertices[None], triangles, 150, pinned=pinned, lines=lines)
+    made = simplify(vertices[None], triangles, 150, importance=np.where(pinned, np.inf, 1), lines=lines)
     assert len(made.level(150).triangles) == 150
     for faces in (1200, 600, 400):
         level = made.level(faces)
@@ -176,6 +177,58 @@ def test_lines_stay_the_shortest_way(seed: int) -> None:
             off = np.abs(level.positions[left][:, None] - vertices[way]).max(axis=2).min(axis=1)
             assert not off.any()
             assert 2 <= len(left) <= len(way)
+            assert len(left) < len(way) or faces > 600  # every line loses vertices, not the first one only
+
+
+def hairs(count: int) -> tuple[Float64, Int32]:
+    """Triangles side by side, 0.1 wide, and longer one after the other."""
+    x = np.arange(count, dtype=np.float64)
+    corners = np.zeros((count, 3, 3))
+    corners[:, :, 0] = x[:, None]
+    corners[:, 1, 0] += 0.1
+    corners[:, 2, 1] = 1 + 0.01 * x
+    return corners.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+
+
+def test_hairs_go_as_a_whole_but_for_the_last_of_a_part() -> None:
+    """The shortest first; what is gone has the nearest vertex of its part as parent."""
+    vertices, triangles = hairs(10)
+    looks = np.repeat([[0.0], [1.0]], 15, axis=0)
+    made = simplify(vertices[None], triangles, 1, looks=looks)
+    assert made.faces.tolist() == [9, 8, 7, 6, 5, 4, 3, 2]
+    level = made.level(6)
+    gone = np.repeat(np.arange(10) < 4, 3)
+    np.testing.assert_array_equal(level.gone, gone)
+    np.testing.assert_array_equal(level.positions[level.parents[~gone]], vertices[~gone])
+    assert (level.positions[level.parents[:12], 0] < 4.2).all()
+    weights = place_on_level(vertices, level)[1]
+    assert not weights[gone].any()
+    np.testing.assert_allclose(weights[~gone].sum(axis=1), 1)
+    bound = np.where(np.arange(30) == 0, np.inf, 1)  # a vertex that stays keeps its triangle
+    made = simplify(vertices[None], triangles, 1, looks=looks, importance=bound)
+    assert len(made.faces) == 8
+    assert not made.level(1).gone[:3].any()
+
+
+@pytest.mark.parametrize(
+    ("angle", "lifted", "depth"),
+    [
+        (0.0, 0.0, 0.0),
+        (30.0, 0.0, 1 - np.cos(np.radians(30))),  # the middle of a chord
+        (30.0, 0.2, 0.0),
+        (200.0, 0.0, 0.0),  # behind the ball
+    ],
+)
+def test_the_depth_to_which_a_triangle_cuts_a_ball(angle: float, lifted: float, depth: float) -> None:
+    """A narrow triangle above a ball of radius 2 closes onto it, its ends at angles from the gaze."""
+    around = np.radians([-angle, angle, angle])
+    around = around if angle < 180 else np.radians([angle - 30, angle, angle])
+    moved = np.stack([0 * around, np.sin(around), np.cos(around)], axis=1) * 2 * (1 + lifted)
+    moved[2, 0] = 1e-6
+    rest = np.array([[0.0, -1, 3], [0, 1, 3], [1e-6, 1, 3]])
+    round_ball = np.concatenate([[0, 0, 0, 0, 0, 1, 2], np.full(13, 2.0)])
+    assert cut_depth(round_ball, rest, moved) == pytest.approx(depth, abs=1e-6)
+    assert cut_depth(round_ball, rest / 2, moved) == 0.0  # it was inside already
 
 
 def test_a_seam_stays_closed_and_its_sides_keep_their_looks() -> None:
@@ -186,7 +239,8 @@ def test_a_seam_stays_closed_and_its_sides_keep_their_looks() -> None:
     vertices = np.concatenate([one, other])
     both = np.concatenate([triangles, triangles[:, ::-1] + len(one)]).astype(np.int32)
     looks = np.concatenate([one[:, :2], 5 + one[:, :2]])
-    level = simplify(vertices[None], both, 200, looks=looks).level(200)
+    part = np.zeros((len(looks), 1))
+    level = simplify(vertices[None], both, 200, looks=np.hstack([part, looks])).level(200)
     assert len(level.positions) > len(np.unique(level.points))
     inner = [pair for pair in edges_once(whole(level)) if pair not in outer_edges(level)]
     assert not inner  # no edge between the halves gapes
@@ -297,7 +351,9 @@ def test_a_single_triangle_and_a_tetrahedron_stay() -> None:
         (np.zeros((1, 3, 3)), [[0, 1, -1]], {}, "vertices beyond the 3"),
         (np.zeros((1, 3, 3)), [[0.0, 1, 2]], {}, "whole numbers"),
         (np.zeros((1, 3, 3)), [0, 1, 2], {}, "whole numbers"),
-        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"pinned": np.zeros(2, bool)}, "pinned must be 3 numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"importance": np.ones(2)}, "importance must be 3 numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": np.ones((1, 8))}, "rows of 9 finite numbers"),
+        (np.zeros((1, 3, 3)), [[0, 1, 2]], {"balls": np.zeros(9)}, "with a size"),
         (np.zeros((1, 3, 3)), [[0, 1, 2]], {"importance": np.full(3, -1.0)}, "importance must be 3 numbers"),
         (np.zeros((1, 3, 3)), [[0, 1, 2]], {"looks": np.zeros((2, 2))}, "looks must have 3 rows"),
     ],

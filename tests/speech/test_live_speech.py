@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bench.speech import visemes
-from bench.spoken import KNOWN, speak
+from bench.speech.spoken import KNOWN, speak
 from fba.animation import Animation
 from fba.arrays import Int16
 from fba.audio import read_mono

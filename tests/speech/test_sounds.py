@@ -39,8 +39,8 @@ def test_unknown_phones_are_refused(name: str) -> None:
 
 @needs_gruut
 def test_numbers_and_abbreviations_become_words() -> None:
-    words = split_text("Dr. Smith paid $25, <b>he</b> said.")
-    assert " ".join(word.text for word in words) == "doctor smith paid twenty five dollars he said"
+    words = split_text("Dr. Smith paid $25, <b>he</b> said &quot;thanks&quot;.")
+    assert " ".join(word.text for word in words) == "doctor smith paid twenty five dollars he said thanks"
     assert all(word.phones for word in words)
 
 

@@ -221,7 +221,7 @@ def test_written_visemes_are_read_again(kind: str, tmp_path: Path) -> None:
     [
         ("", "is empty"),
         ("hello world", "is no file of timings"),
-        ("jawOpen,mouthClose\n0,1\n", "ARKit's curves.*fba encode"),
+        ("jawOpen,mouthClose\n0,1\n", "ARKit's curves.*`fba speak` takes them"),
         (SHORT_TEXTGRID[:120], "cut off or damaged"),
         (SHORT_TEXTGRID.replace("\n3\n0\n", "\n999999999\n0\n"), "cut off or damaged"),
         (LONG_TEXTGRID.replace('"phones"', '"tones"'), "no tier named phones; its tiers are words, tones"),

@@ -26,8 +26,8 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 """For each joint the number of its mate on the other side."""
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
-TROUSERS = np.array([0.040, 0.042, 0.048])
-SEAM, INSIDE = 0.72, 0.6
+TROUSERS = np.array([0.054, 0.059, 0.070])
+SEAM, INSIDE = 0.88, 0.6
 """Brightness of the bands along collar and hems, and of the folds there, relative to the cloth."""
 HEM, WAIST = 0.932, 0.982
 TURN_UP = (0.066, 0.48)
@@ -52,6 +52,10 @@ ARMPIT = (0.155, 1.315)
 """x and y from which those of the shirt spread, metres."""
 FOLD = 0.003
 """Metres by which an edge is folded in below the skin."""
+HEMMED, STITCHED = 0.0016, 0.0007
+"""Metres by which cloth stands out where it is doubled along an edge, and by which stitches draw it in."""
+ROUNDED = ((0.0012, -0.0003), (0.0021, -0.0014), (0.0020, -0.0028))
+"""Rows that round an edge: metres beyond it, and outwards."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,11 +118,11 @@ def trouser_folds(p: Float64) -> Float64:
     x, y, z = np.abs(p[:, 0]), p[:, 1], p[:, 2]
     behind = 0.35 + 0.65 * smoothstep((LEG + 0.05 - z) / 0.06)
     knee = np.exp(-(((y - KNEE) / 0.07) ** 2)) * behind * np.sin((y + 0.3 * x) * 2 * np.pi / 0.042)
-    stack = np.exp(-(((y - 0.13) / 0.06) ** 2)) * np.sin((y + 0.25 * z) * 2 * np.pi / 0.044)
+    stack = np.exp(-(((y - 0.13) / 0.06) ** 2)) * np.sin((y + 0.45 * z) * 2 * np.pi / 0.058)
     away = np.hypot(x, y - CROTCH)
     turn = np.arctan2(y - CROTCH, x + 1e-6)
     pull = smoothstep((away - 0.03) / 0.05) * np.exp(-((away / 0.14) ** 2)) * np.cos(9.0 * turn)
-    return FOLDED * (knee + 1.2 * stack + 0.8 * pull)
+    return FOLDED * (knee + 0.9 * stack + 0.8 * pull)
 
 
 def make_shirt(body: Body) -> Garment:
@@ -198,19 +202,31 @@ def _make_garment(
         vertices[rows] = _move_onto_edge(
             vertices[rows], level, lambda p, rows=rows: edge_distance(p, kinds[rows])
         )
-    # The edge is folded in below the skin.
+    vertices[rim] += outward[rim] * HEMMED
+    vertices[lines[1]] -= outward[lines[1]] * STITCHED
+    # The edge is rounded, and folded in below the skin.
+    beyond = vertices[rim] - _move_onto_edge(
+        vertices[rim], 0.001, lambda p: edge_distance(p, kinds[rim])
+    )  # a millimetre away from the cloth
+    beyond /= np.maximum(np.linalg.norm(beyond, axis=1, keepdims=True), 1e-9)
+    rows = [vertices[rim] + along * beyond + out * outward[rim] for along, out in ROUNDED]
+    rows.append(vertices[rim] - outward[rim] * (thickness[rim] + HEMMED + FOLD)[:, None])
+    count = len(rim)
     place = {vertex: len(vertices) + k for k, vertex in enumerate(rim.tolist())}
-    fold = vertices[rim] - outward[rim] * (thickness[rim] + FOLD)[:, None]
-    loop = cloth.border.tolist()
-    strip = [[b, a, place[a]] for a, b in loop] + [[b, place[a], place[b]] for a, b in loop]
-    inner = np.arange(len(cloth.triangles) + len(strip)) >= len(cloth.triangles)
-    faces = np.concatenate([cloth.triangles, np.array(strip)])
-    weights = np.concatenate([cloth.weights, cloth.weights[rim]])
-    everything = np.concatenate([vertices, fold])
-    across = np.concatenate([cloth.values[:, 0], cloth.values[rim, 0]])
+    loop = np.array([[a, b, place[a], place[b]] for a, b in cloth.border.tolist()])
+    strips = []
+    for row in range(len(rows)):
+        a, b = loop[:, :2].T if row == 0 else loop[:, 2:].T + count * (row - 1)
+        c, d = loop[:, 2:].T + count * row
+        strips += [np.stack([b, a, c], axis=1), np.stack([b, c, d], axis=1)]
+    faces = np.concatenate([cloth.triangles, *strips])
+    inner = np.arange(len(faces)) >= len(faces) - 2 * len(loop)
+    weights = np.concatenate([cloth.weights, *[cloth.weights[rim]] * len(rows)])
+    everything = np.concatenate([vertices, *rows])
+    across = np.concatenate([cloth.values[:, 0], *[cloth.values[rim, 0]] * len(rows)])
     shade = np.where(across[faces].max(axis=1) < band + 1e-6, SEAM, 1.0)
     shade[inner] = INSIDE
-    side = np.concatenate([cloth.vertices[:, 0], cloth.vertices[rim, 0]])
+    side = np.concatenate([cloth.vertices[:, 0], *[cloth.vertices[rim, 0]] * len(rows)])
     everything, weights, faces, shade = _mirror(everything, weights, faces, shade, side)
     everything, weights, faces, tone = _split_by_shade(everything, weights, faces, shade)
     colours = np.concatenate([tone[:, None] * colour, np.full((len(tone), 1), 0.06)], axis=1)

@@ -36,6 +36,10 @@ TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
 GLOSS = 0.38
 DARKEST = 0.55
 """Brightness of a colour where no light of the sky falls."""
+NAIL = (0.52, 0.60)
+"""Share of a finger's last bone from its joint, and of a normal outwards, from which a nail is."""
+NAIL_COLOUR = (1.16, 1.12, 1.14, 2.0)
+"""Factors of the complexion and of its gloss on nails."""
 UNDER = 0.02
 """Skin stays this far (m) under the edges of clothes."""
 TUCKED = 0.011
@@ -93,6 +97,7 @@ def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
             _welded_normals(garment),
         )  # fmt: skip
     pieces["skin"].colours[:, :3] *= _flush_factors(pieces["skin"], bones)
+    _paint_nails(pieces["skin"], bones)
     _shade([piece for piece in pieces.values() if piece.kind != "neck"])
     return pieces, bones
 
@@ -108,6 +113,19 @@ def _flush_factors(piece: Piece, bones: rig.Rig) -> Float64:
         away = np.linalg.norm(piece.vertices[:, None] - middles[joints], axis=2).min(axis=1)
         share = np.maximum(share, strength * np.exp(-((away / reach) ** 2)))
     return 1 - share[:, None] * (0.03, 0.20, 0.22)
+
+
+def _paint_nails(piece: Piece, bones: rig.Rig) -> None:
+    """Make the nails lighter and glossier, in place: the outer side of the ends of fingers."""
+    for number, name in enumerate(bones.names):
+        if name[-1] != "3" or name[0] not in "lr":
+            continue
+        turn, centre = bones.bind[number, :3, :3], bones.bind[number, :3, 3]
+        away = np.linalg.norm(piece.vertices - centre, axis=1)
+        own = piece.weights[:, number] > 0.5
+        outer = (piece.normals @ turn)[:, 0] * (1 if name[0] == "l" else -1)
+        nail = own & (away > NAIL[0] * away[own].max(initial=0.0)) & (outer > NAIL[1])
+        piece.colours[nail] *= NAIL_COLOUR
 
 
 def _shade(pieces: list[Piece]) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import make_baked
 import make_head
 import numpy as np
 from looks import ALEX, FIGURES, Looks, reshape
@@ -111,6 +112,7 @@ def main() -> None:
             path = BUILTIN / "figures" / f"{looks.name}.npz"
             np.savez_compressed(path, **make_figure(looks))
             print(f"{path}: {path.stat().st_size} bytes")
+    make_baked.main()
 
 
 if __name__ == "__main__":

@@ -25,11 +25,14 @@ CHEST = (1.10, 1.34)
 """Heights over which moving out the trunk fades in, metres."""
 CHEST_LEAST = 0.25
 """Share of it at the waist."""
-SLIMMER = 0.012
+SLIMMER = 0.024
 """Metres by which the outside of each thigh is moved in."""
-THIGH, THIGH_HIGH = 0.84, 0.15
+THIGH, THIGH_HIGH = 0.81, 0.17
 """Height of its middle, and its extent, metres."""
-BENDS = (("?_knee", (0.0, 0.0, 1.0), 0.090), ("?_elbow", (0.0, 0.0, -1.0), 0.064))
+BENDS = (
+    ("?_knee", (0.0, 0.0, 1.0), 0.090), ("?_elbow", (0.0, 0.0, -1.0), 0.064),
+    ("?_hip", (0.0, 0.0, -1.0), 0.150),
+)  # fmt: skip
 """Joints about which the surface is refined: direction of the side that stretches, and radius in metres."""
 PAST = 0.02
 """Metres by which the refined region extends to the other side."""

@@ -1,7 +1,7 @@
 """Learns what faces look like: python -m tools.photos.learn_features [HEADS] [SEED]
 
 Renders six pictures of each head and writes fba/face/fitting/front_features.npz. On one core without a
-graphics card: two seconds for each head, and two minutes for the regressions.
+graphics card: three seconds for each head, and as long for the regressions.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from fba.face.feature_points import MIRRORED
 from fba.face.fitting._features import (
     EYES,
     REACHES,
+    SMALL,
     STAGES,
-    WHOLE_LOCAL,
     describe,
-    even,
     gradient_sums,
     luminance,
+    small_face,
     standard_face,
     standard_frame,
     to_standard,
     unit,
-    whole_face,
+    whole_likeness,
 )
 from fba.face.fitting._points_file import FRONT_POINTS
 from fba.parameters import point_rows
@@ -47,13 +47,16 @@ DAMPING = 4.0
 """Weight of small regressions against exact ones, in variances of a number."""
 RESULTS = 36
 """Numbers that a regression gives: shifts of the points are like these."""
-WHOLE_VECTORS = 4
+WHOLE_DAMPING = 1.0
+"""The same for the template of a whole face."""
+ROUNDS = 2
+"""Times that the template is learned again, with the places that it takes for faces."""
 
 Gradients = tuple[np.ndarray, np.ndarray]
 """Sums of gradients of a face, coarse and fine, float16."""
 
 
-def main(heads: int = 100, seed: int = 1) -> None:
+def main(heads: int = 72, seed: int = 1) -> None:
     arrays = learn(list(rendered_faces(heads, seed)), seed)
     np.savez_compressed(OUTPUT, allow_pickle=False, **arrays)
     print(f"{OUTPUT}: {OUTPUT.stat().st_size} bytes from {heads} heads")
@@ -66,19 +69,17 @@ def learn(faces: list[tuple[UInt8, Float64]], seed: int) -> dict[str, np.ndarray
     pictures = [one for pixels, at in faces for one in _both_sides(luminance(pixels), at[rows])]
     mean = np.mean([_upright(at) for _, at in pictures], axis=0)
     gradients: list[Gradients] = []
-    targets, wholes = [], []
+    targets = []
     for grey, at in pictures:
-        middle, across = (at[0] + at[1]) / 2, at[0] - at[1]
-        wholes.append(unit(whole_face(even(standard_face(grey, middle, across), WHOLE_LOCAL))))
         for _ in range(GUESSES):
             middle, across = _misplaced(*standard_frame(at, mean), random)
             face, target = _bent(standard_face(grey, middle, across), to_standard(at, middle, across), random)
             gradients.append(_small(face))
             targets.append(target)
     arrays, places = _cascade(gradients, np.array(targets, dtype=np.float32), mean)
-    others = [_small(face) for face in _no_faces(pictures, mean, random)]
-    vectors = np.linalg.svd(_centred(wholes), full_matrices=False)[2][:WHOLE_VECTORS]
-    whole = np.stack([np.mean(wholes, axis=0), *vectors.reshape(-1, *wholes[0].shape)])
+    no_faces = list(_no_faces(pictures, mean, random))
+    whole, mistaken = _whole(pictures, no_faces, random)
+    others = [_small(face) for face in [*no_faces, *mistaken]]
     return {
         "mean": mean.astype(np.float32),
         **arrays,
@@ -97,11 +98,6 @@ def _both_sides(grey: Float64, at: Float64) -> Iterator[tuple[Float64, Float64]]
 
 def _upright(at: Float64) -> Float64:
     return to_standard(at, (at[0] + at[1]) / 2, at[0] - at[1])
-
-
-def _centred(pictures: list[Float64]) -> Float64:
-    flat = np.array(pictures).reshape(len(pictures), -1)
-    return np.asarray(flat - flat.mean(axis=0))
 
 
 def _small(face: Float64) -> Gradients:
@@ -172,10 +168,10 @@ def _described(gradients: list[Gradients], places: Float32, stage: int) -> Float
     return np.column_stack([np.array(rows), np.ones(len(rows), dtype=np.float32)])
 
 
-def _regression(seen: Float32, results: Float32) -> Float32:
+def _regression(seen: Float32, results: Float32, damping_share: float = DAMPING) -> Float32:
     """Return the weights (D + 1, R) of the ridge regression of results (N, R) on what is seen (N, D + 1)."""
     normal = seen.T @ seen
-    damping = np.full(len(normal), DAMPING * len(seen) * seen[:, :-1].var(axis=0).mean())
+    damping = np.full(len(normal), damping_share * len(seen) * seen[:, :-1].var(axis=0).mean())
     damping[-1] = 1
     normal[np.diag_indices(len(normal))] += damping
     return np.asarray(cho_solve(cho_factor(normal), seen.T @ results))
@@ -196,6 +192,42 @@ def _no_faces(
         else:
             across = -across
         yield standard_face(grey, *_misplaced(middle, across, random))
+
+
+def _whole(
+    pictures: list[tuple[Float64, Float64]], no_faces: list[Float64], random: np.random.Generator
+) -> tuple[Float32, list[Float64]]:
+    """Return the template of a whole face (4 * H * W + 1,), and what it took for faces, at standard size."""
+    found = []
+    for grey, at in pictures:
+        frame = _misplaced((at[0] + at[1]) / 2, at[0] - at[1], random, 0.4)
+        found.append(small_face(standard_face(grey, *frame)).ravel())
+    others = [small_face(face).ravel() for face in no_faces]
+    mistaken: list[Float64] = []
+    for step in range(ROUNDS + 1):
+        seen = np.array([*found, *others], dtype=np.float32)
+        seen = np.column_stack([seen, np.ones(len(seen), dtype=np.float32)])
+        sign = np.where(np.arange(len(seen)) < len(found), 1, -1)[:, None].astype(np.float32)
+        whole = _regression(seen, sign, WHOLE_DAMPING)[:, 0]
+        if step < ROUNDS:
+            new = [face for one in pictures[step::4] for face in _mistaken(*one, whole)]
+            others += [small_face(face).ravel() for face in new]
+            mistaken += new
+    return whole, mistaken
+
+
+def _mistaken(grey: Float64, at: Float64, whole: Float32) -> Iterator[Float64]:
+    """Yield what a template finds most like a face where there is none, at standard size."""
+    true, eyes = (at[0] + at[1]) / 2, float(np.linalg.norm(at[0] - at[1]))
+    for size in (0.4, 0.6, 0.8, 1.0, 1.3, 1.7):
+        factor = EYES / SMALL / (eyes * size)
+        likeness = whole_likeness(zoom(grey, factor, order=1, grid_mode=True, mode="nearest"), whole)
+        down, right = np.mgrid[: likeness.shape[0], : likeness.shape[1]] / factor
+        if 0.7 < size < 1.5:
+            likeness[np.hypot(right - true[0], down - true[1]) < 0.4 * eyes] = -np.inf
+        y, x = np.unravel_index(int(likeness.argmax()), likeness.shape)
+        if likeness[y, x] > -0.5:
+            yield standard_face(grey, np.array([x, y]) / factor, np.array([eyes * size, 0.0]))
 
 
 def _likeness(

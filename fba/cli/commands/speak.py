@@ -28,6 +28,8 @@ WELL_HEARD = 0.8
 """Nothing is said of missing words where at least this share of a text's words is heard."""
 MOST_NAMED = 5
 """Spans that are named of those in which more is spoken than a text says."""
+CURVE = b"jawopen"
+"""A name that all curves of ARKit have, in small letters."""
 CLIPPED = 0.001
 """A recording with at least this share of its samples at full scale counts as clipped."""
 
@@ -54,7 +56,8 @@ class _Said:
         type=options.FILE,
         metavar="FILE",
         help="Phones or visemes with their times, by another program: TextGrid, CTM, SRT with phones, files "
-        "of Montreal Forced Aligner, Rhubarb, Papagayo, Moho; visemes of Azure, Oculus, Polly as JSON.",
+        "of Montreal Forced Aligner, Rhubarb, Papagayo, Moho; visemes of Azure, Oculus, Polly as JSON; ARKit's "
+        "curves as CSV or JSON.",
     )
     language: str = option(
         default="en-us",
@@ -168,9 +171,16 @@ def command(
     from fba.planning import encode
     from fba.speech import encoder_options, perform
 
-    spoken, prosody, voice = _find(said, text, sound, outputs)
+    motion = None if said.timings is None else _read_curves(said.timings, manner)
+    spoken, prosody, voice = _find(said, text, sound, outputs, motion)
     animation = perform(
-        spoken, rate=manner.rate, coding=manner.coding, style=manner.style, life=manner.life, prosody=prosody
+        spoken,
+        rate=manner.rate,
+        coding=manner.coding,
+        style=manner.style,
+        life=manner.life,
+        prosody=prosody,
+        motion=motion,
     )
     if moods:
         from fba.emotion import emote
@@ -246,11 +256,27 @@ def _text(said: _Said) -> str | None:
         ) from None
 
 
+def _read_curves(path: Path, manner: _Manner) -> Animation | None:
+    """Return the motion of a face that ARKit's curves hold; None for other timings."""
+    from fba.source import read_head
+
+    if CURVE not in read_head(path).lower():
+        return None
+    from fba.formats import read
+
+    if manner.coding == "visemes":
+        warn(
+            f"{path}: visemes are guessed from the motion of its mouth, and most are not the ones that were "
+            "meant; --coding faps sends the motion itself"
+        )
+    return read(path, rate=manner.rate)
+
+
 def _find(
-    said: _Said, text: str | None, sound: Path | None, outputs: Outputs
+    said: _Said, text: str | None, sound: Path | None, outputs: Outputs, motion: Animation | None
 ) -> tuple[Speech, Prosody | None, str]:
     """Return what is spoken, its loudness and pitch, and the program that spoke it, if one did."""
-    from fba.speech import read_timings, split_text
+    from fba.speech import find_timings, read_timings, split_text
 
     voice = ""
     words = None if text is None else split_text(text, said.language)
@@ -259,7 +285,7 @@ def _find(
         assert sound is not None
         voice = _speak(text, sound, said, outputs)
     if said.timings is not None:
-        timings = read_timings(said.timings)
+        timings = read_timings(said.timings) if motion is None else find_timings(motion)
         return timings, None if sound is None else _measure(sound), voice
     assert sound is not None
     spoken, prosody = _listen(sound, words, said.language)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -53,6 +53,11 @@ class _Given:
     distance: float | None = option(
         type=LENGTH, metavar="1.5m", help="Distance of the camera from the head. Default: 1.5m."
     )
+    hair: Literal["keep", "none"] = option(
+        default="keep",
+        help="The built-in hair where no photograph shows anything: keep it, or none for a bald head. "
+        "Default: keep.",
+    )
     name: str | None = option(help="Name of the model. Default: the name of the frontal photograph.")
 
 
@@ -97,6 +102,7 @@ def command(
             photos[1] if len(photos) > 1 else None,
             eyes=given.eyes,
             distance=given.distance or fitting.DISTANCE,
+            hair=given.hair == "keep",
             name=given.name or front.stem,
         )
     with outputs.file(target.output) as file:

@@ -1,9 +1,9 @@
 """What faces look like, learned from rendered ones: the whole face, and how its points are found.
 
-The template of a whole face, with the distance from the space of its eigenvectors, is that of Karpouzis,
-section 7.3, and so are pupils by brightness. The other points come from a cascade of linear regressions on
-gradients (X. Xiong and F. De la Torre, "Supervised descent method", 2013): templates, Gabor phases and
-eigenfeatures of single points, his way, left those of the eyes nearly twice as far off.
+A whole face is found by a template of gradients (N. Dalal and B. Triggs, "Histograms of oriented gradients",
+2005), its points by a cascade of linear regressions on gradients (X. Xiong and F. De la Torre, "Supervised
+descent method", 2013), pupils by brightness as in Karpouzis, section 7.3. His templates with eigenvectors, of
+the whole face and of single points, and his Gabor phases missed more.
 `tools/photos/learn_features.py` makes the data.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.signal import fftconvolve
 
-from fba.arrays import Float32, Float64, Floating, UInt8
+from fba.arrays import Float32, Float64, UInt8
 
 EYES = 44.0
 """Pixels between the pupils in a face of standard size."""
@@ -29,8 +29,6 @@ SMALL = 4.0
 """Factor by which the template of a whole face is smaller."""
 WHOLE = (14, 9, 20)
 """Beside, above and below the middle of the eyes: what the whole face's template shows, small pixels."""
-WHOLE_LOCAL = 28.0
-"""Pixels over which brightness and contrast of a whole face are evened."""
 REACHES = (4.0, 2.0)
 """Pixels over which gradients are summed, coarse and fine."""
 STAGES = (0, 0, 1, 1, 1)
@@ -46,7 +44,7 @@ class Features:
     mean: (P, 2), where points are in a face of standard size, pixels. weights: (5, D + 1, K), the
     regressions of the cascade, the constant last; times scales (5, K). bases: (5, K, 2P), the shifts
     of points that the K results stand for. likeness: (D + 1,), the regression of "is a face" (1) or not (-1).
-    whole: (1 + 4, H, W), the template of the whole small face and its eigenvectors.
+    whole: (4 * H * W + 1,), the regression of "is a face" on the gradients of a whole small face, `WHOLE`.
     """
 
     mean: Float64
@@ -54,7 +52,7 @@ class Features:
     scales: Float32
     bases: Float32
     likeness: Float32
-    whole: Float64
+    whole: Float32
 
     def follow(self, face: Float64, places: Float64, first: int = 0) -> tuple[Float64, float]:
         """Return points (P, 2) found in a face of standard size from a guess, and their likeness to a face's.
@@ -74,7 +72,7 @@ class Features:
 def features() -> Features:
     """Return the features that come with the package."""
     with as_file(files(__package__) / "front_features.npz") as path, np.load(path) as content:
-        single = ("weights", "scales", "bases", "likeness")
+        single = ("weights", "scales", "bases", "likeness", "whole")
         return Features(
             **{name: content[name].astype("f4" if name in single else "f8") for name in content.files}
         )
@@ -82,8 +80,8 @@ def features() -> Features:
 
 def gradient_sums(face: Float64, reach: float) -> Float32:
     """Return sums (4, H, W) of gradients right, left, down and up around each pixel, contrast evened."""
-    down, right = np.gradient(gaussian_filter(face, reach / 2))
-    strength = np.sqrt(gaussian_filter(right**2 + down**2, 5 * reach)) + 0.002
+    down, right = np.gradient(gaussian_filter(face.astype(np.float32), reach / 2))
+    strength = np.sqrt(gaussian_filter(right**2 + down**2, 5 * reach, truncate=2.0)) + 0.002
     parts = (right, -right, down, -down)
     sums = [gaussian_filter(np.maximum(part, 0), 0.75 * reach) / strength for part in parts]
     return np.array(sums, dtype=np.float32)
@@ -117,12 +115,6 @@ def standard_frame(places: Float64, mean: Float64) -> tuple[Float64, Float64]:
 def luminance(pixels: UInt8) -> Float64:
     """Return the brightness (H, W), 0 to 1, of a picture (H, W, 3), as its file stores it."""
     return np.asarray(pixels @ np.array([0.299, 0.587, 0.114]) / 255)
-
-
-def even(grey: Float64, reach: float) -> Float64:
-    """Return a picture with the same brightness and contrast everywhere, over this many pixels."""
-    low = grey - gaussian_filter(grey, reach)
-    return np.asarray(low / (np.sqrt(gaussian_filter(low**2, reach)) + 0.02))
 
 
 def standard_face(grey: Float64, middle: Float64, across: Float64) -> Float64:
@@ -162,41 +154,32 @@ def from_standard(places: Float64, middle: Float64, across: Float64) -> Float64:
     return np.asarray(middle + off[..., :1] * step + off[..., 1:] * np.array([-step[1], step[0]]))
 
 
-def correlate(picture: Floating, kernel: Floating) -> Float64:
-    """Return the sums of products (H, W) of a kernel with the picture around each pixel."""
-    return np.asarray(fftconvolve(picture, kernel[::-1, ::-1].conj(), mode="same"))
-
-
-def windows(picture: Float64, shape: tuple[int, int]) -> tuple[Float64, Float64]:
-    """Return the mean (H, W) of the window around each pixel, and the length of its difference from that."""
-    ones = np.ones(shape)
-    count = shape[0] * shape[1]
-    mean = correlate(picture, ones) / count
-    square = correlate(picture**2, ones)
-    return mean, np.sqrt(np.maximum(square - count * mean**2, 1e-6 * count))
-
-
-def subspace(picture: Float64, mean: Float64, vectors: Float64) -> tuple[Float64, Float64]:
-    """Return (correlation, distance from the feature space) of the window around each pixel, each (H, W).
-
-    mean: (S, T), of windows of mean 0 and length 1. vectors: (K, S, T), orthonormal, of mean 0.
-    """
-    _, length = windows(picture, mean.shape)
-    along = correlate(picture, mean) / length
-    size = float((mean**2).sum())
-    distance = 1 + size - 2 * along
-    for vector in vectors:
-        distance -= (correlate(picture, vector) / length - float((vector * mean).sum())) ** 2
-    return along / max(np.sqrt(size), 1e-9), np.maximum(distance, 0.0)
-
-
-def whole_face(face: Float64) -> Float64:
-    """Return the part of an evened face of standard size that the template of a whole face shows, small."""
-    beside, above, below = WHOLE
-    x = MIDDLE[0] + SMALL * np.arange(-beside, beside + 1)
-    y = MIDDLE[1] + SMALL * np.arange(-above, below + 1)
+def small_face(face: Float64) -> Float32:
+    """Return `gradient_sums` (4, H, W) of a whole face of standard size, small: what its template shows."""
+    height, width = face.shape
+    x = np.arange(MIDDLE[0] % SMALL, width - 1, SMALL)
+    y = np.arange(MIDDLE[1] % SMALL, height - 1, SMALL)
     smooth = gaussian_filter(face, SMALL / 2)
-    return np.asarray(map_coordinates(smooth, np.meshgrid(y, x, indexing="ij"), order=1, mode="nearest"))
+    small = map_coordinates(smooth, np.meshgrid(y, x, indexing="ij"), order=1, mode="nearest")
+    beside, above, below = WHOLE
+    column, row = int(MIDDLE[0] // SMALL), int(MIDDLE[1] // SMALL)
+    sums = np.sqrt(gradient_sums(small, 1.0))
+    return np.asarray(sums[:, row - above : row + below + 1, column - beside : column + beside + 1])
+
+
+def whole_likeness(small: Float64, whole: Float32) -> Float64:
+    """Return how like a face's the surroundings of each pixel are as the middle of the eyes: (H, W).
+
+    small: a picture in which faces have EYES / SMALL pixels between the pupils. whole: as in `Features`.
+    """
+    beside, above, below = WHOLE
+    kernels = whole[:-1].reshape(4, above + below + 1, 2 * beside + 1)
+    sides = ((above, below), (beside, beside))
+    sums = np.sqrt(gradient_sums(np.pad(small, sides, mode="edge"), 1.0))
+    parts = (
+        fftconvolve(one, kernel[::-1, ::-1], mode="valid") for one, kernel in zip(sums, kernels, strict=True)
+    )
+    return np.asarray(sum(parts) + float(whole[-1]), dtype=np.float64)
 
 
 def unit(patch: Float64) -> Float64:

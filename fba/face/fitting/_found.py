@@ -20,9 +20,11 @@ class FoundPoints:
     """Points that were found on a photograph.
 
     points: pixels to the right and down by name. score: how well they look like those of a face, 0 to 1.
-    steps: pictures of how they were found.
+    steps: pictures of how they were found. doubts: by part of the face (eyes, brows, nose, mouth, chin), how
+    far its points are apart when they are found from several places, in distances between the pupils.
     """
 
     points: dict[str, tuple[float, float]]
     score: float
     steps: list[Step] = field(default_factory=list)
+    doubts: dict[str, float] = field(default_factory=dict)

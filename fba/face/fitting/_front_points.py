@@ -1,7 +1,7 @@
 """`find_front_points`: the feature points of a face on a frontal photograph.
 
 The whole face is found first; then, from each place like one, a cascade of regressions moves the points of a
-mean face to where gradients around them say; pupils last, by their brightness.
+mean face to where gradients around them say, from the best place several times; pupils last, by brightness.
 """
 
 from __future__ import annotations
@@ -11,24 +11,23 @@ from scipy.ndimage import gaussian_filter, maximum_filter, zoom
 
 from fba.arrays import Float64, UInt8
 from fba.errors import ModelError, warn
+from fba.face.feature_points import MIRRORED
 from fba.face.fitting._features import (
     EYES,
     SMALL,
-    WHOLE,
-    WHOLE_LOCAL,
-    even,
     features,
     from_standard,
     luminance,
     standard_face,
     standard_frame,
-    subspace,
     to_standard,
+    whole_likeness,
 )
 from fba.face.fitting._found import FoundPoints, Step
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS
 
+_MIRRORED = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 LARGEST = 0.5
 """Largest distance between the pupils that is looked for, as a share of the picture's smaller side."""
 SMALLEST = 0.035
@@ -36,7 +35,7 @@ SIZES = 1.12
 """Ratio of successive sizes."""
 FACE_SCORE = 0.0
 """Least likeness to a face; that of faces is about 1, of other things about -1."""
-CANDIDATES = 60
+CANDIDATES = 40
 """Places like a whole face whose points are looked at, at most."""
 OF_EACH_SIZE = 6
 LARGER = 0.05
@@ -47,6 +46,19 @@ HARDLY_SEEN = ("2.13", "2.14", "10.9", "10.10", "10.5", "10.6", "11.1")
 """Points that are moved with the others, but not proposed: too little tells where they are."""
 TURNS = (-12.0, 0.0, 12.0)
 """Degrees by which the picture is turned while the face is looked for."""
+TRIES = ((0.0, 0.0, 1.0), (0.06, 0.0, 0.94), (-0.06, 0.0, 1.06), (0.0, 0.06, 1.06), (0.0, -0.06, 0.94))
+"""Shifts right and down, in distances between the pupils, and growth of what points are found from."""
+PARTS = {
+    "eyes": ("3.5", "3.6", "3.7", "3.11", "3.8", "3.12", "3.1", "3.3", "3.2", "3.4"),
+    "brows": ("4.1", "4.3", "4.5", "4.2", "4.4", "4.6"),
+    "nose": ("9.3", "9.1", "9.2", "9.15"),
+    "mouth": ("8.3", "8.4", "8.1", "8.9", "8.10", "8.2", "8.5", "8.6", "8.7", "8.8", "2.2"),
+    "chin": ("2.1", "2.10"),
+}
+DOUBT = {"eyes": 0.02, "brows": 0.027, "nose": 0.03, "mouth": 0.027, "chin": 0.045}
+"""Spread of several tries beyond which the points of a part are doubtful, in distances between the pupils.
+
+More than in any of 40 pictures of other heads on which the part was found; of brows, where they were."""
 PUPIL = 5
 """Pixels of a face of standard size around a pupil in which it is looked for."""
 
@@ -54,27 +66,72 @@ PUPIL = 5
 def find_front_points(photograph: Photograph) -> FoundPoints:
     """Return the feature points of the face on a frontal photograph.
 
-    Raises ModelError where no face is found. Warns (FbaWarning) where there may be several.
+    Raises ModelError where no face is found. Warns (FbaWarning) where there may be several, and of the parts
+    of the face whose points are doubtful: those that end elsewhere when they are found again from other
+    places and on the mirrored picture.
     """
     grey = luminance(photograph.pixels)
     middle, across, score, where = _find_face(grey, photograph.name)
     steps = [Step("Where a whole face is most likely", where)]
-    mean = features().mean
     face = standard_face(grey, middle, across)
-    places, _ = features().follow(face, mean)
-    steps.append(Step("From the points of a mean face to those of this one", _draw(face, mean, places)))
-    for _ in range(2):
-        at = from_standard(places, middle, across)
-        middle, across = standard_frame(at, mean)
-        face = standard_face(grey, middle, across)
-        places, _ = features().follow(face, to_standard(at, middle, across), 2)
-    places = _with_pupils(face, places)
-    steps.append(Step("The same from there, and pupils by their brightness", _draw(face, None, places)))
+    places, _ = features().follow(face, features().mean)
+    steps.append(
+        Step("From the points of a mean face to those of this one", _draw(face, features().mean, places))
+    )
+    at, spread = _found_again(grey, middle, across)
+    middle, across = standard_frame(at, features().mean)
+    face = standard_face(grey, middle, across)
+    places = _with_pupils(face, to_standard(at, middle, across))
+    steps.append(Step("The middle of ten tries, and pupils by their brightness", _draw(face, None, places)))
     at = from_standard(places, middle, across) * photograph.scale
     found = {name: (float(x), float(y)) for name, (x, y) in zip(FRONT_POINTS, at, strict=True)}
+    doubts = {
+        part: float(spread[[FRONT_POINTS.index(name) for name in names]].mean())
+        for part, names in PARTS.items()
+    }
+    doubtful = [part for part, doubt in doubts.items() if doubt > DOUBT[part]]
+    if doubtful:
+        warn(
+            f"{photograph.name or 'the picture'}: the points of the {' and the '.join(doubtful)} are "
+            "doubtful; look at them, and drag them to where they belong "
+            "(`fba model photos ... --edit POINTS.json`)",
+            stacklevel=2,
+        )
     return FoundPoints(
-        {name: place for name, place in found.items() if name not in HARDLY_SEEN}, score, steps
+        {name: place for name, place in found.items() if name not in HARDLY_SEEN}, score, steps, doubts
     )
+
+
+def _found_again(grey: Float64, middle: Float64, across: Float64) -> tuple[Float64, Float64]:
+    """Return the points (P, 2), pixels, in the middle of several tries, and how far tries are apart.
+
+    The spread (P,) is the mean distance from that middle, in distances between the pupils.
+    """
+    mirror = np.array([grey.shape[1] - 1.0, 0.0])
+    swapped = [FRONT_POINTS.index(_MIRRORED.get(name, name)) for name in FRONT_POINTS]
+    tries = []
+    for right, down, grow in TRIES:
+        start = middle + right * across + down * np.array([-across[1], across[0]])
+        tries.append(_points_from(grey, start, across * grow))
+        other = _points_from(grey[:, ::-1], mirror + start * (-1, 1), across * (grow, -grow))
+        tries.append((mirror + other * (-1, 1))[swapped])
+    at = np.median(tries, axis=0)
+    spread = np.linalg.norm(np.array(tries) - at, axis=2).mean(axis=0)
+    return at, spread / float(np.linalg.norm(at[0] - at[1]))
+
+
+def _points_from(grey: Float64, middle: Float64, across: Float64) -> Float64:
+    """Return the points (P, 2), pixels, found from where a face may be; as `standard_face` takes it."""
+    known = features()
+    places, first = known.mean, 0
+    for _ in range(2):
+        face = standard_face(grey, middle, across)
+        places, _ = known.follow(face, places, first)
+        at = from_standard(places, middle, across)
+        middle, across = standard_frame(at, known.mean)
+        places, first = to_standard(at, middle, across), 2
+    places, _ = known.follow(standard_face(grey, middle, across), places, first)
+    return from_standard(places, middle, across)
 
 
 def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8]:
@@ -89,22 +146,15 @@ def _find_face(grey: Float64, name: str) -> tuple[Float64, Float64, float, UInt8
         while eyes >= max(SMALLEST * side, EYES / SMALL):
             # The template has EYES / SMALL pixels between the pupils.
             factor = EYES / SMALL / eyes
-            if min(height, width) * factor < whole.shape[1] * 0.8:
+            if min(height, width) * factor < 24:
                 eyes /= SIZES
                 continue
             small = _turned(_reduced(grey, factor), degrees)
-            # The surroundings are evened as in training: over as many pixels of the standard size.
-            level = even(np.pad(small, 8, mode="edge"), WHOLE_LOCAL / SMALL)
-            along, distance = subspace(level, whole[0], whole[1:])
-            likeness = np.clip(along, 0, 1) * np.clip(1 - distance / 2, 0, 1)
-            likeness = likeness[8:-8, 8:-8]
+            likeness = whole_likeness(small, whole)
             for y, x in _maxima(likeness):
-                _, above, below = WHOLE
-                # The kernel's middle is not the middle of the eyes: it reaches further down.
-                eye = np.array([float(x), float(y) - (below - above) / 2])
-                middle, step = _turned_back(eye, small.shape, degrees)
+                middle, step = _turned_back(np.array([x, y], dtype=np.float64), small.shape, degrees)
                 best.append((float(likeness[y, x]), middle / factor, step * eyes))
-            if float(likeness.max()) >= max((one[0] for one in best), default=0.0):
+            if float(likeness.max()) >= max((one[0] for one in best), default=-np.inf):
                 shown = likeness
             eyes /= SIZES
     if not best:
@@ -140,9 +190,9 @@ def _is_inside(middle: Float64, across: Float64, shape: tuple[int, ...]) -> bool
 
 
 def _maxima(likeness: Float64) -> list[tuple[int, int]]:
-    """Return rows and columns of the four highest local maxima."""
-    peaks = np.argwhere((likeness == maximum_filter(likeness, 5)) & (likeness > 0))
-    order = np.argsort(-likeness[tuple(peaks.T)], kind="stable")[:4]
+    """Return rows and columns of the highest local maxima."""
+    peaks = np.argwhere(likeness == maximum_filter(likeness, 5))
+    order = np.argsort(-likeness[tuple(peaks.T)], kind="stable")[:OF_EACH_SIZE]
     return [(int(y), int(x)) for y, x in peaks[order]]
 
 

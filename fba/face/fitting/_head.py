@@ -65,12 +65,14 @@ def head_from_photos(
     *,
     eyes: float | None = None,
     distance: float = DISTANCE,
+    hair: bool = True,
     name: str = "",
 ) -> PhotoHead:
     """Return the built-in head fitted to a person in a frontal photograph and, for its depth, a profile.
 
     eyes: metres between the person's pupils, which photographs do not tell; None for those of the built-in
-    head. distance: metres from the camera to the head. name: of the model.
+    head. distance: metres from the camera to the head. hair: whether the built-in hair stays where no
+    photograph shows anything. name: of the model.
 
     The head's skin is taken from the photographs: the frontal one, beyond about 45 degrees around the head
     the profile, mirrored for the other side, and the built-in skin in their tone where neither shows any.
@@ -108,7 +110,7 @@ def head_from_photos(
     views = fit_views(model.points, views, seen)
     errors = tuple(_errors(model, view, one) for view, one in zip(views, seen, strict=True))
     _warn_of_errors([view for view, _ in photos], errors)
-    model, share = paint(model, [photo.photograph for _, photo in photos], views)
+    model, share = paint(model, [photo.photograph for _, photo in photos], views, hair=hair)
     made = "frontal photograph and profile" if side is not None else "frontal photograph"
     model = model.with_notes({"skin": f"from a {made}"})
     return PhotoHead(model, tuple(views), errors, measure(model, base), share)

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import binary_dilation, gaussian_filter
 
 from fba.arrays import Bool, Float32, Float64, Floating, Int32, UInt8
 from fba.errors import ModelError
@@ -52,6 +52,10 @@ TONES = 128
 """Width and height of the grid on which tones are compared."""
 HAIR = 0.055
 """Linear luminance of the built-in skin below which it is hair."""
+BROW_MARGIN = 0.006
+"""Metres above the brows, and behind their ends, from which dark places are hair of the skull."""
+BALD_EDGE = 6
+"""Texels beside the hair of the built-in skin that skin takes the place of, too."""
 TONE_RANGE = 1.2
 """Largest difference of tones that is evened, as a natural logarithm."""
 REFLECTED = np.float32(0.72)
@@ -70,11 +74,12 @@ class _Surface:
 
 
 def paint(
-    model: FaceModel, photographs: Sequence[Photograph], views: Sequence[View]
+    model: FaceModel, photographs: Sequence[Photograph], views: Sequence[View], *, hair: bool = True
 ) -> tuple[FaceModel, float]:
     """Return (the model with the skin of the photographs, share of the face's skin that they show).
 
     The first photograph is the frontal one, a second the profile, which also serves the other side mirrored.
+    hair: whether the built-in hair stays where neither shows anything; otherwise skin takes its place.
     """
     part = next((one for one in model.of_kind("skin") if one.texcoords is not None), None)
     if part is None:
@@ -88,6 +93,8 @@ def paint(
     )
     corner = _triangle_map(surface.texcoords[surface.triangles] * SIZE - 0.5, (SIZE, SIZE))
     own = _own_skin(part, surface, corner)
+    if not hair:
+        own = _without_hair(own, model, surface, corner)
     layers = [_Layer(surface, model, photographs[0], views[0], first=True, alone=len(views) == 1)]
     if len(views) > 1:
         layers.insert(0, _Layer(surface, model, photographs[1], views[1], first=False, alone=False))
@@ -253,6 +260,24 @@ def _own_skin(part: Part, surface: _Surface, corner: Int32) -> Float32:
         for rows, triangles, shares in _corners_of_texels(surface, corner):
             plain[rows] *= np.einsum("rck,rckd->rcd", shares, part.colours[triangles, :3])
     return plain
+
+
+def _without_hair(own: Float32, model: FaceModel, surface: _Surface, corner: Int32) -> Float32:
+    """Return the head's own skin with the tone of the skin nearby where hair of the skull was."""
+    brows = float(model.points[[point_rows()["4.3"], point_rows()["4.4"]], 1].max())
+    temples = float(model.points[[point_rows()["4.5"], point_rows()["4.6"]], 2].min())
+    middle = surface.vertices[surface.triangles].mean(axis=1)
+    skull = (middle[:, 1] > brows + BROW_MARGIN) | (middle[:, 2] < temples - BROW_MARGIN)
+    dark = own @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32) < HAIR
+    gone = dark & skull[np.maximum(corner, 0)] & (corner >= 0)
+    gone = binary_dilation(gone, iterations=BALD_EDGE)
+    known = (~gone & ~dark & (corner >= 0)).astype(np.float32)
+    share = _shrink(known)
+    tones = [
+        _spread(_shrink(own[..., channel] * known) / np.maximum(share, 1e-6), share) for channel in range(3)
+    ]
+    weight = gaussian_filter(gone.astype(np.float32), BALD_EDGE / 2)[..., None]
+    return np.asarray(own + weight * (_grow(np.stack(tones, axis=-1)) - own), dtype=np.float32)
 
 
 def _even(below: Float32, above: Float32, weight: Float32, own: Float32) -> Float32:

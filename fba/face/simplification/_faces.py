@@ -22,7 +22,7 @@ from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
 from fba.face.importers.assembly._repair import repair_tables, take_sounder
 from fba.face.model import DetailLevel, FaceModel, shape_key
-from fba.face.simplification._tables import find_lines, fit_tables
+from fba.face.simplification._tables import find_balls, find_lines, fit_tables
 from fba.mesh.simplify import (
     Level,
     Simplification,
@@ -40,10 +40,12 @@ POSES: tuple[dict[int, int], ...] = (
      7: 200, 53: 200, 54: 200},
     {4: 300, 8: 300, 9: 300, 5: -300, 10: -300, 11: -300, 6: -200, 7: -200, 53: -200, 54: -200, 19: -300,
      20: -300, 33: 300, 34: 300},
-    {16: 500, 17: 500, 6: -150, 7: -150, 4: 200, 5: 200, 41: 200, 42: 200, 3: 300},
+    {16: 500, 17: 500, 6: -150, 7: -150, 4: 200, 5: 200, 41: 200, 42: 200, 3: 300, 19: 424, 20: 424, 21: 600,
+     22: 600},
 )  # fmt: skip
 """FAP values of the poses in which the face is simplified: at rest, the jaw open, the lids closed with a
-broad grin, the lips apart with wide eyes, and the lips pushed forward with raised cheeks."""
+broad grin, the lips apart with wide eyes, and the lips pushed forward with raised cheeks and lids that meet
+half way."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
 IMPORTANCE = 100.0
@@ -105,7 +107,7 @@ class FaceSimplification:
         for pose in self.poses:
             moved = level.positions + level.carry(pose - self.poses[0])
             off = np.einsum("nk,nkd->nd", weights, moved[rows]) - pose
-            errors.append(sum_up(np.linalg.norm(off, axis=1)))
+            errors.append(sum_up(np.linalg.norm(off[~level.gone], axis=1)))
         return errors
 
     def build(self, level: Level, *, tables: bool = True) -> DetailLevel:
@@ -174,10 +176,10 @@ def simplify_face(model: FaceModel, faces: int | Sequence[int]) -> FaceSimplific
         poses,
         model.triangles,
         faces,
-        pinned=kept,
         looks=part_looks(model),
-        importance=_importance(model),
+        importance=np.where(kept, np.inf, _importance(model)),
         lines=lines,
+        balls=find_balls(model),
     )
     return FaceSimplification(model, mesh, poses, kept | (lines > 0))
 

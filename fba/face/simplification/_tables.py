@@ -14,7 +14,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Int32, Intp
 from fba.face._tables import FaceDefMesh, FaceDefTables, interval_lengths
-from fba.face.authoring.regions._eye_opening import LIDS, Profile, measure_profile
+from fba.face.authoring.regions._eye_opening import ANGLES, LIDS, Profile, measure_profile
 from fba.face.authoring.regions._eyes import find_eyes
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import (
@@ -68,6 +68,16 @@ def find_lines(model: FaceModel) -> Int32:
             lines[marks.surface.pool[np.isin(marks.surface.number, piece)]] |= 1 << bit
             bit += 1
     return lines
+
+
+def find_balls(model: FaceModel) -> Float64:
+    """Return (B, 7 + R): eyeballs, which lids must not cut, as `fba.mesh.simplify.simplify` takes them."""
+    rows = [np.zeros((0, 7 + len(ANGLES)))]
+    for eye in find_eyes(_landmarks(model), model.parts).values():
+        if eye.measured and not eye.flat:
+            profile = measure_profile(eye, model.parts, 0.0)
+            rows.append(np.concatenate([eye.centre, eye.gaze, [profile.size], profile.straight])[None])
+    return np.concatenate(rows)
 
 
 def fit_tables(

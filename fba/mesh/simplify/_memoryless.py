@@ -28,6 +28,8 @@ class Level:
     positions: float64 (M, 3), at rest. triangles: int32 (F, 3). parents: int32 (N,), the vertex of this level
     that stands for each vertex of the full mesh. points: int32 (M,), equal for vertices along a seam that are
     one. rows, weights: int32 and float64 (M, 3), vertices of the full mesh that each is interpolated from.
+    gone: bool (N,), vertices of which nothing is left, as of a hair that went as a whole; their parents are
+    the nearest vertices of the part.
     """
 
     positions: Float64
@@ -36,6 +38,7 @@ class Level:
     points: Int32
     rows: Int32
     weights: Float64
+    gone: Bool
 
     def carry(self, values: Floating) -> Float64:
         """Return values (M, ...) at this level's vertices of those (N, ...) at the full mesh's."""
@@ -56,6 +59,7 @@ class Simplification:
     faces: Int32
     _points: Int32
     _wedges: Int32
+    _parts: Int32
     _kept: Int32
     _place: Float64
     _forest: tuple[Int32, Int32]
@@ -86,13 +90,30 @@ class Simplification:
         number = np.full(len(home), -1, dtype=np.int32)
         number[used] = np.arange(len(used))
         # a side of a seam that has no triangle left: any other vertex at its place stands for it
-        beside = np.zeros(len(place), dtype=np.int32)
+        beside = np.full(len(place), -1, dtype=np.int32)
         beside[points] = number[used]
         parents = np.where(number[wedge] >= 0, number[wedge], beside[root]).astype(np.int32)
         positions = place[points]
+        gone = parents < 0
+        self._adopt(parents, positions)
         triangles = np.ascontiguousarray(corner.reshape(-1, 3), dtype=np.int32)
         rows, weights = self._sources(positions, parents)
-        return Level(positions, triangles, parents, points, rows, weights)
+        return Level(positions, triangles, parents, points, rows, weights, gone)
+
+    def _adopt(self, parents: Int32, positions: Float64) -> None:
+        """Write the parents of vertices that have none, -1: the nearest of the vertices, (M, 3), that stand
+        for others of their part."""
+        from scipy.spatial import cKDTree
+
+        lost = parents < 0
+        for part in np.unique(self._parts[lost]):
+            own = self._parts == part
+            left = np.unique(parents[own & ~lost])
+            left = left if len(left) else np.arange(len(positions))
+            if len(left):
+                near = cKDTree(positions[left]).query(self.positions[own & lost])[1]
+                parents[own & lost] = left[near]
+        parents[parents < 0] = 0  # no triangle is left
 
     @cached_property
     def _full(self) -> Int32:
@@ -110,18 +131,21 @@ def simplify(
     triangles: Integer,
     faces: int | Sequence[int],
     *,
-    pinned: Bool | None = None,
     looks: Floating | None = None,
     importance: Floating | None = None,
     lines: Integer | None = None,
+    balls: Floating | None = None,
 ) -> Simplification:
     """Return the simplification of a mesh down to a number of triangles, or through several, falling.
 
-    poses: (K, N, 3), the vertices in K poses, the first at rest. triangles: (F, 3). pinned: (N,), vertices
-    that stay where they are. looks: (N, A), texture coordinates and colours: vertices of one position and
-    different looks are a seam, which stays closed; without, or with equal ones, they are one vertex.
-    importance: (N,), factors of the cost around each vertex, 1 by default. lines: (N,), a bit for each line
-    through a vertex, such as a lid's margin: neighbours of one line collapse along it only.
+    poses: (K, N, 3), the vertices in K poses, the first at rest. triangles: (F, 3). looks: (N, A), number of
+    the part, texture coordinates and colours: vertices of one position and different looks are a seam, which
+    stays closed; without, or with equal ones, they are one vertex. A triangle that touches no other, such as
+    a hair, may go, but not the last one of its part. importance: (N,), factors of the cost around each
+    vertex, 1 by default, infinite for one that stays where it is. lines: (N,), a bit for each line through a
+    vertex, such as a lid's margin: neighbours of one line collapse along it only. balls: (B, 7 + R), what
+    triangles must not cut in the poses, such as eyeballs: centre (3), gaze (3), size, and R >= 2 radii at
+    equal steps of the angle from the gaze, 0 to 180 degrees.
 
     An edge's cost is the source's (half the squared volumes that the collapse sweeps, half the squared areas
     along borders and seams times the squared length of the edge), summed over the poses, over the area around
@@ -146,14 +170,17 @@ def simplify(
     whole = points[corners]
     proper = (whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])
     whole, sides = np.ascontiguousarray(whole[proper]), np.ascontiguousarray(wedges[corners[proper]])
+    parts = _number_rows(given[:, :1]) if given.shape[1] else np.zeros(count, np.int32)
+    part = parts[corners[proper, 0]]
     kind = _kinds(whole, sides, total)
-    if pinned is not None:
-        kind[points[_per_vertex(pinned, count, "pinned") > 0]] = loops.PINNED
     welded = np.empty((total, len(places), 3))
     welded[points] = places.transpose(1, 0, 2)
     weight = np.ones(total)
     if importance is not None:
-        weight[points] = _per_vertex(importance, count, "importance")
+        factors = _per_vertex(importance, count, "importance")
+        weight[points] = factors
+        kind[points[np.isinf(factors)]] = loops.PINNED
+        weight[np.isinf(weight)] = 1.0
     through = np.zeros(total, np.int64)
     if lines is not None:
         np.bitwise_or.at(through, points, _per_vertex(lines, count, "lines").astype(np.int64))
@@ -162,6 +189,7 @@ def simplify(
     surface = loops.Surface(
         welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
         kind, np.zeros(total, np.int64), weight, through, *_measure_lines(welded[:, 0], whole, through),
+        part, np.bincount(part, minlength=1).astype(np.int32), _check_balls(balls),
     )  # fmt: skip
     number = int(wedges.max(initial=-1)) + 1
     history = loops.History(
@@ -181,7 +209,7 @@ def simplify(
             left = int(history.faces[done - 1]) if done else len(whole)
             done = loops.collapse_edges(surface, history, done, left, max(int(target), 1), scratch)
     return Simplification(
-        places[0], corners, history.faces[:done].copy(), points, wedges, history.kept[:done].copy(),
+        places[0], corners, history.faces[:done].copy(), points, wedges, parts, history.kept[:done].copy(),
         history.place[:done].copy(), (history.onto, history.step), (history.wedge_onto, history.wedge_step),
     )  # fmt: skip
 
@@ -198,9 +226,12 @@ def _link(surface: Any, scratch: Any) -> None:
 
 def place_on_level(positions: Floating, level: Level) -> tuple[Int32, Float64]:
     """Return where each vertex (N, 3) of the full mesh lies on a level: int32 (N, 3), vertices of the level,
-    and float64 (N, 3), their weights. Only triangles around the vertex that stands for it count."""
+    and float64 (N, 3), their weights, 0 for what is gone. Only triangles around the vertex that stands for it
+    count."""
     corners = level.positions[level.triangles]
-    return _nearest(positions, corners, level.triangles, level.parents, level.triangles)
+    rows, weights = _nearest(positions, corners, level.triangles, level.parents, level.triangles)
+    weights[level.gone] = 0.0
+    return rows, weights
 
 
 def place_on_full(
@@ -273,7 +304,7 @@ def _on_triangles(points: Floating, corners: Floating) -> tuple[Float64, Float64
 
 def _per_vertex(values: Floating | Integer | Bool, count: int, what: str) -> Float64:
     array = np.asarray(values, dtype=np.float64)
-    if array.shape != (count,) or not np.isfinite(array).all() or (array < 0).any():
+    if array.shape != (count,) or np.isnan(array).any() or (array < 0).any():
         raise ModelError(f"{what} must be {count} numbers that are not negative, one for each vertex")
     return array
 
@@ -289,6 +320,13 @@ def _check(poses: Floating, triangles: Integer) -> tuple[Float64, Int32]:
     if corners.size and not 0 <= corners.min() <= corners.max() < places.shape[1]:
         raise ModelError(f"triangles name vertices beyond the {places.shape[1]} that exist")
     return places, np.ascontiguousarray(corners, dtype=np.int32)
+
+
+def _check_balls(balls: Floating | None) -> Float64:
+    rows = np.zeros((0, 9)) if balls is None else np.array(balls, dtype=np.float64, ndmin=2)
+    if rows.ndim != 2 or rows.shape[1] < 9 or not np.isfinite(rows).all() or not (rows[:, 6] > 0).all():
+        raise ModelError(f"balls must have rows of 9 finite numbers or more, with a size, not {rows.shape}")
+    return np.ascontiguousarray(rows)
 
 
 def _number_rows(rows: Float64) -> Int32:

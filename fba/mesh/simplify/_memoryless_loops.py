@@ -18,6 +18,7 @@ import numpy as np
 
 from fba.arrays import Float64, Int32, Int64
 from fba.compiled import compiled, inlined
+from fba.mesh.simplify._balls import cut_depth, is_near
 
 MAX_RING = 64
 """A vertex with more triangles than this takes no part in collapses."""
@@ -32,6 +33,8 @@ MIN_COMPACTNESS = 0.1
 """No triangle becomes less compact than this, 1 for an equilateral one, while others can go."""
 NEARLY = 1e-5
 """Share by which a way beside a line must be longer: positions are rounded when a line is looked for."""
+MAX_CUT = 0.005
+"""Depth to which triangles may cut a ball in a pose, as a share of its size."""
 MAX_ON_LINE = 1 << 30
 """More vertices than a line has."""
 FREE, ON_LINE, PINNED = 0, 1, 2
@@ -47,6 +50,8 @@ class Surface(NamedTuple):
     importance: (V,), factors of the cost. lines: (V,), a bit for each line through a vertex that is kept.
     ends: int32 (L, 2), the first and the last vertex of each line, -1 for a line that need not stay the
     shortest way between them. left, longest: int32 and float64 (L,), vertices left, and the first length.
+    part, share: int32 (F,) and (P,), the part of each triangle, and how many each part has left. balls:
+    float64 (B, 7 + N), what triangles must not cut in poses; see `_balls`.
     """
 
     places: Float64
@@ -61,6 +66,9 @@ class Surface(NamedTuple):
     ends: Int32
     left: Int32
     longest: Float64
+    part: Int32
+    share: Int32
+    balls: Float64
 
 
 class History(NamedTuple):
@@ -329,6 +337,18 @@ def _cost_at(sums: Float64, place: Float64, t: float) -> float:
 
 
 @compiled
+def _cost_alone(surface: Surface, scratch: Scratch) -> float:
+    """Return the cost of a triangle that touches no other, the only one in the ring, with which it goes as a
+    whole. It counts as if it were as wide as it is long: a hair has little area, yet its lack is seen."""
+    corners, squared = surface.triangles[scratch.ring[0]], 0.0
+    for i in range(3):
+        way = _distance(surface.places[corners[i], 0], surface.places[corners[(i + 1) % 3], 0])
+        squared = max(squared, way * way)
+    scratch.squared[0] = squared * squared
+    return surface.places.shape[1] * (1 - SURFACE_SHARE) / 2 * squared**3
+
+
+@compiled
 def _find_place(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[float, float]:
     """Write where the edge from a to b is best collapsed to, relative to a; return the cost and where that
     is along the edge, 0 for a and 1 for b. The cost is -1 for an edge that must stay."""
@@ -345,6 +365,9 @@ def _find_place(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[flo
     for i in range(3):
         edge[i] = places[b, 0, i] - places[a, 0, i]
         squared += edge[i] * edge[i]
+    if count == 1:
+        scratch.place[:] = 0.0
+        return _cost_alone(surface, scratch), 0.0
     volume = _sum_changes(surface, a, b, count, scratch)
     if kind[a] != FREE or kind[b] != FREE:
         _add_lines(surface, a, b, count, (1 - SURFACE_SHARE) * squared / 4, scratch)
@@ -385,11 +408,14 @@ def _priority(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[float
     """Return the cost of an edge by which edges are ordered, and where along it the collapse goes.
 
     That is the cost over the area around the edge, so that a finely modelled region, whose triangles are
-    small, is not the first to go, times the importance of its ends. -1 for an edge that must stay.
+    small, is not the first to go, times the importance of its ends that may move. -1 for an edge that must
+    stay.
     """
     cost, along = _find_place(surface, a, b, scratch)
     if cost > 0.0 and scratch.squared[0] > 0.0:
-        cost *= 0.5 * (surface.importance[a] + surface.importance[b]) / np.sqrt(scratch.squared[0])
+        one = surface.importance[b if surface.kind[a] == PINNED else a]
+        other = surface.importance[a if surface.kind[b] == PINNED else b]
+        cost *= 0.5 * (one + other) / np.sqrt(scratch.squared[0])
     return cost, along
 
 
@@ -451,17 +477,30 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
         c = surface.follow[c]
     for i in range(own):
         common += seen[i]
-    faces = 0
+    faces, one = 0, -1
     c = surface.first[a]
     while c >= 0:
         t = c // 3
         if surface.triangles[t, 0] >= 0 and _corner_of(surface.triangles[t], b) >= 0:
-            faces += 1
+            faces, one = faces + 1, t
         c = surface.follow[c]
+    if faces == 1 and both == 3:
+        return _may_go(surface, one)
     border = _on_border(surface, a) or _on_border(surface, b)
     if _on_border(surface, a) and _on_border(surface, b) and faces != 1:
         return False
     return common == faces and 1 <= faces <= 2 and both > (3 if border else 4)
+
+
+@compiled
+def _may_go(surface: Surface, t: int) -> bool:
+    """Return whether a triangle that touches no other may go: not the last of its part, nor one with a vertex
+    that stays, by itself or as one of a line."""
+    free = surface.share[surface.part[t]] > 1
+    for k in range(3):
+        v = surface.triangles[t, k]
+        free = free and surface.kind[v] != PINNED and surface.lines[v] == 0
+    return bool(free)
 
 
 @compiled
@@ -596,6 +635,46 @@ def _turns_over(
     return False
 
 
+@compiled
+def _cuts_ball(surface: Surface, a: int, b: int, t: float, count: int, scratch: Scratch) -> bool:
+    """Return whether a triangle would cut a ball in a pose, and deeper than those around the edge do."""
+    for ball in surface.balls:
+        near = False
+        for k in range(surface.places.shape[1]):
+            near = near or is_near(ball, surface.places[a, k])
+        if near:
+            after = _deepest(surface, ball, a, b, t, count, scratch)
+            if after > MAX_CUT and after > _deepest(surface, ball, -1, -1, t, count, scratch):
+                return True
+    return False
+
+
+@compiled
+def _deepest(
+    surface: Surface, ball: Float64, a: int, b: int, t: float, count: int, scratch: Scratch
+) -> float:
+    """Return how deep the triangles of the ring cut a ball, in the worst pose, where the edge from a to b has
+    collapsed; -1 twice for as they are."""
+    places, corners, deepest = surface.places, np.empty((2, 3, 3)), 0.0
+    for i in range(count):
+        triangle = surface.triangles[scratch.ring[i]]
+        if a >= 0 and _corner_of(triangle, a) >= 0 and _corner_of(triangle, b) >= 0:
+            continue
+        for k in range(places.shape[1]):
+            for at in range(3):
+                v = triangle[at]
+                for n in range(3):
+                    if v in (a, b):
+                        corners[min(k, 1), at, n] = (
+                            places[a, k, n] + scratch.place[n] + t * scratch.sums[k, 10 + n]
+                        )
+                    else:
+                        corners[min(k, 1), at, n] = places[v, k, n]
+            if k > 0:
+                deepest = max(deepest, cut_depth(ball, corners[0], corners[1]))
+    return deepest
+
+
 @inlined
 def _square(x: float, y: float, z: float) -> float:
     """Return the squared length of a vector."""
@@ -643,7 +722,11 @@ def collapse_edges(
                 lost += _corner_of(corners, a) >= 0 and _corner_of(corners, b) >= 0
             if faces - lost < target or _turns_over(surface, a, b, along, count, least, scratch):
                 continue
-            if not _is_valid(surface, a, b, scratch) or (least > 0.0 and _cuts_line(surface, a, b, scratch)):
+            if not _is_valid(surface, a, b, scratch):
+                continue
+            if least > 0.0 and (
+                _cuts_line(surface, a, b, scratch) or _cuts_ball(surface, a, b, along, count, scratch)
+            ):
                 continue
             kind, other = surface.kind[a], surface.kind[b]
             if other > kind or (other == kind and kind != FREE and along > 0.0):
@@ -698,7 +781,7 @@ def _collapse(
     history.onto[gone] = keep
     history.step[gone] = step
     for line in range(len(surface.ends)):
-        surface.left[line] -= surface.lines[keep] & surface.lines[gone] >> line & 1
+        surface.left[line] -= (surface.lines[keep] & surface.lines[gone]) >> line & 1
         for i in range(2):
             if surface.ends[line, i] == gone:
                 surface.ends[line, i] = keep
@@ -723,6 +806,7 @@ def _collapse(
             wedges[t, k] = history.wedge_onto[wedges[t, k]]
             if _corner_of(triangles[t], keep) >= 0:
                 triangles[t, 0] = -1
+                surface.share[surface.part[t]] -= 1
             else:
                 triangles[t, k] = keep
         c = surface.follow[c]

@@ -29,22 +29,22 @@ class DetailLevels:
 
     points: (V, N), each vertex's positions in all poses that count (3 x poses columns), then any attributes
     to be preserved, scaled so that a difference of 1 weighs as much as a metre. triangles: int32 (F, 3).
-    kept: bool (V,), vertices that stay at every level, as along lips that would gape; or None.
+    known: the `collapses`, where they are stored elsewhere.
     """
 
     points: Float32
     poses: int
     triangles: Int32
-    kept: Bool | None = None
+    known: tuple[Int32, Int32] | None = None
 
     def triangles_within(self, tolerance: float) -> Int32 | None:
         """Return int32 (F, 3): the coarsest triangles with at most this error (m); None for all."""
         level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
         if level < 0 or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
             return None
-        onto, first = self._collapses
+        onto, first = self.collapses
         target = np.arange(len(onto), dtype=np.int32)
-        collapses = first <= level if self.kept is None else (first <= level) & ~self.kept
+        collapses = first <= level
         for _ in range(MAX_PASSES * len(TOLERANCES)):  # no more steps than passes were made
             if not collapses[target].any():
                 break
@@ -52,13 +52,15 @@ class DetailLevels:
         return _without_flat(target[self.triangles])
 
     @cached_property
-    def _collapses(self) -> tuple[Int32, Int32]:
-        """What `simplify_by_quadrics` returns."""
+    def collapses(self) -> tuple[Int32, Int32]:
+        """What `simplify_by_quadrics` returns: int32 (V,) twice."""
+        count = len(self.points)
+        if self.known is not None and len(self.known[0]) == count:
+            return self.known
 
         def make() -> list[Int32]:
             return list(simplify_by_quadrics(self.points.astype(np.float64), self.poses, self.triangles))
 
-        count = len(self.points)
         key = make_key("coarse", CACHE_VERSION, self.points, self.triangles)
         onto, first = load_or_make(key, ((count,), (count,)), make, np.int32)
         if (onto < 0).any() or (onto >= count).any():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from fba.compiled import is_compiled
 from fba.errors import FbaWarning
 from fba.face import FaceModel, Part
 from fba.mesh import vertex_normals
-from fba.mesh.simplify import DetailLevels, place_on_full
+from fba.mesh.simplify import TOLERANCES, DetailLevels, place_on_full
 from fba.parameters import point_rows
 from fba.rotations import unit
 from fba.sampling import smoothstep
@@ -92,9 +92,9 @@ def make_shape(part: Part, sways: Float32) -> FaceShape:
     )
 
 
-def detail_levels(part: BodyPart, more: Float32) -> DetailLevels:
+def detail_levels(part: BodyPart, more: Float32, stored: dict[str, Any]) -> DetailLevels:
     """Return the levels of detail of a body's part. more: (V, N), attributes to preserve besides normals,
-    colours and texture, scaled to metres."""
+    colours and texture, scaled to metres. stored: what `load_baked` returns for the body."""
     columns = [part.vertices]
     if part.normals is not None:
         columns.append(part.normals * NORMAL_WEIGHT)
@@ -104,7 +104,30 @@ def detail_levels(part: BodyPart, more: Float32) -> DetailLevels:
     if part.colours is not None:
         columns.append(part.colours[:, :3] * COLOUR_WEIGHT)
     columns.append(more)
-    return DetailLevels(np.concatenate(columns, axis=1).astype(np.float32), 1, part.triangles)
+    known = tuple(stored[f"{part.name}/{n}"].astype(np.int32) for n in ("onto", "first")) if stored else None
+    return DetailLevels(np.concatenate(columns, axis=1).astype(np.float32), 1, part.triangles, known)
+
+
+def cast_coarsely(shape: FaceShape, part: Part, stored: dict[str, Any]) -> FaceShape:
+    """Return a part of a face of which all levels of detail cast the shadow of a much coarser mesh.
+
+    stored: what `load_baked` returns for the face.
+    """
+    if not (shape.casts and shape.levels):
+        return shape
+    last = shape.levels[-1]
+    if f"{part.name}/outer" in stored:
+        outer = stored[f"{part.name}/outer"].astype(np.int32)
+    else:
+        points = np.einsum("nk,nkd->nd", last.weights, part.vertices[last.rows]).astype(np.float32)
+        coarse = DetailLevels(points, 1, last.shape.triangles).triangles_within(TOLERANCES[-1])
+        if coarse is None:
+            return shape
+        outer = last.first[coarse].astype(np.int32)
+    levels = tuple(
+        replace(level, shape=replace(level.shape, outer=level.parents[outer])) for level in shape.levels
+    )
+    return replace(shape, outer=outer, levels=levels)
 
 
 def part_rows(model: FaceModel | BodyModel, name: str) -> slice:
@@ -152,13 +175,12 @@ def keep_triangles(shape: FaceShape, vertices: Bool, *, whole: bool) -> FaceShap
         chosen = kept[triangles].all(axis=1) if whole else kept[triangles].any(axis=1)
         return np.ascontiguousarray(triangles[chosen], dtype=np.int32)
 
-    levels = tuple(
-        replace(
-            level, shape=replace(level.shape, triangles=left(level.shape.triangles, vertices[level.first]))
-        )
-        for level in shape.levels
-    )
-    return replace(shape, triangles=left(shape.triangles, vertices), levels=levels)
+    def cut(shape: FaceShape, kept: Bool) -> FaceShape:
+        outer = None if shape.outer is None else left(shape.outer, kept)
+        return replace(shape, triangles=left(shape.triangles, kept), outer=outer)
+
+    levels = tuple(replace(level, shape=cut(level.shape, vertices[level.first])) for level in shape.levels)
+    return replace(cut(shape, vertices), levels=levels)
 
 
 def find_hairs(part: Part) -> Float32 | None:
@@ -184,7 +206,7 @@ def find_hairs(part: Part) -> Float32 | None:
     half[rows] = length[nearest] / 2
     if not paired.any() or 2 * float(np.median(half[paired])) > MAX_HAIR_WIDTH:
         return None
-    hair = _pieces(edges, count)
+    hair = join_pieces(edges, count)
     tip = np.full(count, -1)
     tip[hair[~paired]] = np.flatnonzero(~paired)  # unpaired: a tip's nearest has a nearer one
     complete = paired & (tip[hair] >= 0)
@@ -196,7 +218,7 @@ def find_hairs(part: Part) -> Float32 | None:
     return across
 
 
-def _pieces(edges: Intp, count: int) -> Intp:
+def join_pieces(edges: Intp, count: int) -> Intp:
     """Return (V,): the lowest vertex in each vertex's connected piece. edges: (E, 2), in both directions."""
     lowest = np.arange(count)
     while True:  # each round halves the remaining distance

@@ -6,9 +6,8 @@ their gaze up and down, so the player adds that to what it draws; FAPs and featu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-
-import numpy as np
 
 from fba.arrays import Float32
 from fba.face.points import PITCH_EYE
@@ -35,8 +34,8 @@ def follow_gaze(faps: Float32, eyes: Iterable[tuple[int, float]], unit: float) -
         if shown is faps:
             shown = faps.copy()
         upper, lower = UPPER[side] - 1, LOWER[side] - 1
-        open_share = float(np.clip(1 - (faps[upper] + faps[lower]) / CLOSED, 0.0, 1.0))
-        way = np.sin(pitch) * radius / unit * open_share
+        open_share = min(max(1 - float(faps[upper] + faps[lower]) / CLOSED, 0.0), 1.0)
+        way = math.sin(pitch) * radius / unit * open_share
         shown[upper] += UPPER_FOLLOWS * way
         shown[lower] -= LOWER_FOLLOWS * way
     return shown

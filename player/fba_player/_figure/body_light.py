@@ -13,6 +13,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Intp
 from fba.body import BodyModel
+from fba_player._figure.baked_shapes import load_baked, unpack
 from fba_player._figure.face_light import cached_visibility
 
 UNOBSTRUCTED_LIGHT = (1.0, 0.95, 0.0, 0.25)
@@ -37,8 +38,8 @@ FOLD_STRENGTH = 0.75
 class BodyLight:
     """Light on a body; see `build_body_light`.
 
-    ends: (K, 2), the joints at both ends of its capsules, and radii: (K,), metres. Occlusion is computed on
-    first use, in about a second, and stored in the disk cache.
+    ends: (K, 2), the joints at both ends of its capsules, and radii: (K,), metres. Occlusion comes with
+    the library's own figures; of others it is computed on first use, in about a second.
     """
 
     body: BodyModel
@@ -48,11 +49,15 @@ class BodyLight:
     @cached_property
     def open_sky(self) -> Float32:
         """(V,): the share of the sky that the body's folds leave to each vertex."""
-        body = self.body
-        open_ = cached_visibility(
-            body.vertices, body.normals, body.triangles, np.ones(len(body.vertices), bool)
-        ).open
+        stored = load_baked(self.body.parts)
+        open_ = unpack(stored["values"], stored["step"])[:, 0] if stored else self.bake()
         return np.asarray(1 - FOLD_STRENGTH * (1 - np.clip(open_, 0, 1)), dtype=np.float32)
+
+    def bake(self) -> Float32:
+        """Compute what reaches each vertex of the sky: float32 (V,), 0..1."""
+        body = self.body
+        every = np.ones(len(body.vertices), dtype=bool)
+        return cached_visibility(body.vertices, body.normals, body.triangles, every).open
 
     @cached_property
     def light(self) -> Float32:

@@ -51,9 +51,10 @@ MIN_SWAY_ON_BODY = 0.45
 class Eyeball:
     """One eyeball in the neutral face. side: 0 left, 1 right. centre: (3,), and radius, metres.
 
-    rows: sampled vertices of the part, away from the pupil. neutral: their positions. lids: the model's
-    vertices at `LID_POINTS`, -1 for missing ones. iris, pupil: diameters (m). step: change of the pupil's
-    diameter for one unit of FAP 29 or 30. tint: colour of the iris, linear light, None for that of `Eye`.
+    rows: sampled vertices of the part, away from the pupil. neutral: their positions. bent: whether
+    FaceDefMeshes move them, not only the part's transforms. lids: the model's vertices at `LID_POINTS`, -1
+    for missing ones. iris, pupil: diameters (m). step: change of the pupil's diameter for one unit of FAP 29
+    or 30. tint: colour of the iris, linear light.
     """
 
     side: int
@@ -61,30 +62,37 @@ class Eyeball:
     radius: float
     rows: Intp
     neutral: Float64
+    bent: bool
     lids: tuple[int, ...]
     iris: float
     pupil: float
     step: float
-    tint: tuple[float, float, float] | None = None
+    tint: tuple[float, float, float]
 
-    def pose(self, part: Float32, face: Float32, faps: Float32, matrix: Float64) -> Eye:
-        """Return the eye for moved vertices (V, 3) of its part and of the face, put into the world."""
-        moved = part.take(self.rows, axis=0).astype(np.float64)
-        fitted = fit_similarity(self.neutral, moved)
-        turn, centre = fitted.rotation, fitted.target + fitted.rotation @ (self.centre - fitted.centre)
-        frame = np.eye(4)
-        frame[:3, :3] = turn * self.radius
-        frame[:3, 3] = centre
+    def pose(
+        self, part: Float32, face: Float32, faps: Float32, matrix: Float64, turn: Float64 | None = None
+    ) -> Eye:
+        """Return the eye for moved vertices (V, 3) of its part and of the face, put into the world.
+
+        turn: (4, 4), what moves the part; None to find it by the vertices.
+        """
+        if turn is None:
+            fitted = fit_similarity(self.neutral, part.take(self.rows, axis=0).astype(np.float64))
+            turn = np.eye(4)
+            turn[:3, :3], turn[:3, 3] = fitted.rotation, fitted.target - fitted.rotation @ fitted.centre
+        frame = turn.copy()
+        frame[:3, :3] *= self.radius
+        frame[:3, 3] += turn[:3, :3] @ self.centre
         pupil = self.pupil + self.step * float(faps[PUPIL_FAPS[self.side] - 1])
         iris = self.iris / 2 / self.radius
-        eye = Eye(
+        return Eye(
             matrix @ frame,
             iris,
             min(max(pupil / 2 / self.radius, 0.03), iris * 0.92),
-            self._lid_positions(face, centre),
+            self._lid_positions(face, frame[:3, 3]),
             matrix[:3, :3] / math.sqrt(matrix[:3, 0] @ matrix[:3, 0]),
+            self.tint,
         )
-        return eye if self.tint is None else replace(eye, tint=self.tint)
 
     def _lid_positions(self, face: Float32, centre: Float64) -> Float64:
         """Return the lid points (4, 3) from the centre, in radii; for missing ones, those of an open eye."""
@@ -113,8 +121,11 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     rows = behind[np.unique(np.linspace(0, len(behind) - 1, SAMPLED_VERTICES).astype(int))]
     unit = model.fapu.IRISD
     lids = tuple(int(model.bound[point_rows()[name]]) for name in LID_POINTS[side])
-    tint = _iris_tint(part, centre, unit * 512)
-    return Eyeball(side, centre, radius, rows, vertices[rows], lids, unit * 1024, unit * 1024 / 3, unit, tint)
+    meshes = [mesh for table in model.tables for mesh in table.meshes if mesh.part == part.name]
+    bent = any(np.isin(rows, mesh.vertices).any() for mesh in meshes)
+    tint = _iris_tint(part, centre, unit * 512) or Eye.tint
+    iris = unit * 1024
+    return Eyeball(side, centre, radius, rows, vertices[rows], bent, lids, iris, iris / 3, unit, tint)
 
 
 def _iris_tint(part: Part, centre: Float64, radius: float) -> tuple[float, float, float] | None:
@@ -236,10 +247,12 @@ class FaceFigure:
         """
         pose = self.pose(faps)
         placed = matrix if turned else matrix @ pose.turn
-        return [
-            ball.pose(pose.positions[self.rows(part.name)], pose.positions, faps, placed)
-            for part, ball in self.eyeballs
-        ]
+        turns = dict(zip(self.model.starts, self.deformer.part_matrices(faps), strict=True))
+        eyes = []
+        for part, ball in self.eyeballs:
+            moved, turn = pose.positions[self.rows(part.name)], None if ball.bent else turns[part.name]
+            eyes.append(ball.pose(moved, pose.positions, faps, placed, turn))
+        return eyes
 
     def points(self, faps: Float32, matrix: Float64) -> Float64:
         """Return float64 (84, 3): feature points in the world for FAPs (68,); NaN for missing ones."""

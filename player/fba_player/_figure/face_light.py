@@ -6,16 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from fba.arrays import Bool, Float16, Float32, Float64, Int32, Intp
+from fba.arrays import Array, Bool, Float16, Float32, Float64, Int32, Intp
 from fba.cache import load_or_make, make_key
 from fba.compiled import is_compiled
 from fba.face import Deformer, FaceModel
 from fba.parameters import point_rows
 from fba_player._figure._closing_lines import closing_vertices
-from fba_player._figure._face_parts import part_rows
+from fba_player._figure._face_parts import join_pieces, part_rows
+from fba_player._figure.baked_shapes import load_baked, pack, unpack
 from fba_player._figure.occlusion import CACHE_VERSION, HARMONICS, Visibility, bake, weights
 
 KEY_DIRECTION = (0.70, 0.68, 0.80)
@@ -61,12 +63,33 @@ class Baked:
     near: Bool
     gaps: tuple[float, float]
 
+    def pack(self) -> dict[str, Array]:
+        """Return it as arrays that take little space; see `unpack_light`."""
+        both = np.concatenate([_joined(self.shut), _joined(self.wide)[self.near]])
+        return {**pack(both), "near": self.near, "gaps": np.array(self.gaps)}
+
+
+def unpack_light(arrays: dict[str, Any]) -> Baked:
+    """Return what `Baked.pack` packed."""
+    both, near = unpack(arrays["values"], arrays["step"]), arrays["near"]
+    shut = both[: len(near)]
+    wide = shut.copy()
+    wide[near] = both[len(near) :]
+    first, last = (Visibility(t[:, :HARMONICS], t[:, HARMONICS:-1], t[:, -1]) for t in (shut, wide))
+    return Baked(first, last, near, tuple(arrays["gaps"]))
+
+
+def _joined(seen: Visibility) -> Float32:
+    """Return float32 (V, 33): light, light through the skin, sky."""
+    return np.concatenate([seen.light, seen.through, seen.open[:, None]], axis=1)
+
 
 class FaceLight:
     """Light on a face model.
 
-    sway (V,): how far each vertex goes with the head. Occlusion is computed on first use, for the mouth shut
-    and open, in about a second, and stored in the disk cache.
+    sway (V,): how far each vertex goes with the head. Occlusion, for the mouth shut and open, comes with the
+    library's own figures; of others it is computed on first use, in about a second, and stored in the disk
+    cache.
     """
 
     def __init__(self, model: FaceModel, deformer: Deformer, sway: Float32) -> None:
@@ -128,10 +151,7 @@ class FaceLight:
         """Visibility with the mouth shut (33, V), the same (33, N) where vertices turn only partly with the
         head, and with it wide open (33, M) near it; vertices (M,) near the mouth, and those (N,)."""
         near, partly = np.flatnonzero(self.baked.near), np.flatnonzero(self._sway < 1)
-        shut, wide = (
-            np.concatenate([seen.light, seen.through, seen.open[:, None]], axis=1).T.copy()
-            for seen in (self.baked.shut, self.baked.wide)
-        )
+        shut, wide = (_joined(seen).T.copy() for seen in (self.baked.shut, self.baked.wide))
         return (shut, shut[:, partly], wide[:, near]), near, partly
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
@@ -156,6 +176,11 @@ class FaceLight:
     @cached_property
     def baked(self) -> Baked:
         """Visibility of every vertex past the rest of the face."""
+        stored = load_baked(self._model.parts)
+        return unpack_light(stored) if stored else self.bake()
+
+    def bake(self) -> Baked:
+        """Compute `baked`."""
         solid = [part for part in self._model.parts if part.kind not in ("brow", "lash")]
         joined = [part.triangles + self._model.starts[part.name] for part in solid]
         triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
@@ -218,13 +243,9 @@ class FaceLight:
 
 def _largest_piece(triangles: Int32, chosen: Bool, near: Bool) -> Bool:
     """Return bool (V,): the connected piece of chosen vertices that has most of those that are near."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
     edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
-    edges = edges[chosen[edges].all(axis=1)]
-    ones = np.ones(len(edges), dtype=bool)
-    _, piece = connected_components(csr_array((ones, edges.T), shape=(len(chosen),) * 2), directed=False)
+    edges = edges[chosen[edges].all(axis=1)].astype(np.intp)
+    piece = join_pieces(np.concatenate([edges, edges[:, ::-1]]), len(chosen))
     most = np.bincount(piece[chosen & near], minlength=1)
     return chosen & (piece == most.argmax()) if most.any() else np.zeros_like(chosen)
 

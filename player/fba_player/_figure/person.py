@@ -11,9 +11,9 @@ from fba.arrays import Bool, Float32, Float64
 from fba.body import AttachedHead, BodyModel, BodyPart, attach_head
 from fba.body.head_attachment import skull_of
 from fba.face import Part
-from fba.mesh.simplify import TOLERANCES, DetailLevels
 from fba.parameters import point_rows
-from fba_player._figure._face_parts import detail_levels, keep_triangles, make_shape, part_rows
+from fba_player._figure._face_parts import cast_coarsely, detail_levels, keep_triangles, make_shape, part_rows
+from fba_player._figure.baked_shapes import load_baked
 from fba_player._figure.body_light import BodyLight, build_body_light
 from fba_player._figure.face import FaceFigure
 from fba_player._figure.wrinkles import wrinkle_strengths
@@ -119,7 +119,8 @@ def build_person(body: BodyModel, figure: FaceFigure) -> Person:
         head = attach_head(body, model.vertices, eyes, skull)
         face_shapes = _face_shapes(figure, head)
         left_out = ("head", "neck") if head.brings_neck else ("head",)
-    shapes = {part.name: _shape(part, len(body.skeleton)) for part in body.parts if part.kind not in left_out}
+    stored, joints = load_baked(body.parts), len(body.skeleton)
+    shapes = {part.name: body_shape(part, joints, stored) for part in body.parts if part.kind not in left_out}
     if head is None:
         rows = head_rows(body)
         for name, shape in shapes.items():  # a coarser face would let its teeth and eyes through
@@ -163,34 +164,21 @@ def turn_own_head(body: BodyModel, matrices: Float64, turn: Float64) -> Float64:
 def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]:
     """Return the face's parts by name, without the triangles that clothes hide."""
     model, shapes = figure.model, {}
+    stored = load_baked(model.parts)
     chin = model.points[point_rows()["2.1"]][1]
     for name, shape in figure.shapes.items():
         part = model.part(name)
         if part.kind == "other" and part.vertices[:, 1].max() < chin:
             continue
-        visible = keep_triangles(shape, ~head.hidden[figure.rows(name)], whole=False)
+        coarse = cast_coarsely(shape, part, stored)
+        visible = keep_triangles(coarse, ~head.hidden[figure.rows(name)], whole=False)
         if len(visible.triangles):
-            shapes[name] = _cast_coarsely(visible, part)
+            shapes[name] = visible
     return shapes
 
 
-def _cast_coarsely(shape: FaceShape, part: Part) -> FaceShape:
-    """Return a part of a face of which all levels of detail cast the shadow of a much coarser mesh."""
-    if not (shape.casts and shape.levels):
-        return shape
-    last = shape.levels[-1]
-    points = np.einsum("nk,nkd->nd", last.weights, part.vertices[last.rows]).astype(np.float32)
-    outer = DetailLevels(points, 1, last.shape.triangles).triangles_within(TOLERANCES[-1])
-    if outer is None:
-        return shape
-    outer = last.first[outer].astype(np.int32)  # of the full part
-    levels = tuple(
-        replace(level, shape=replace(level.shape, outer=level.parents[outer])) for level in shape.levels
-    )
-    return replace(shape, outer=outer, levels=levels)
-
-
-def _shape(part: BodyPart, joints: int) -> FaceShape:
+def body_shape(part: BodyPart, joints: int, stored: dict[str, Any]) -> FaceShape:
+    """Return the constant data of a part of a body with so many joints. stored: as `load_baked` returns it."""
     shape = make_shape(cast(Part, part), np.ones(len(part.vertices), dtype=np.float32))
     # Vertices must remain where joints bend the body: preserve the weights, in a few fixed projections.
     random = np.random.default_rng(7).standard_normal((joints, WEIGHT_PROJECTIONS)) / WEIGHT_PROJECTIONS**0.5
@@ -198,7 +186,7 @@ def _shape(part: BodyPart, joints: int) -> FaceShape:
     open_surface = part.material.two_sided
     return replace(
         shape, scatter=float(part.kind in SCATTERING_KINDS), two_sided=open_surface, closed=not open_surface,
-        name="", coarser=detail_levels(part, carried.astype(np.float32)), casts=True,
+        name="", coarser=detail_levels(part, carried.astype(np.float32), stored), casts=True,
     )  # fmt: skip
 
 

@@ -1,4 +1,7 @@
-"""Level of detail: parts that are small on the screen are drawn with fewer triangles."""
+"""Level of detail: parts that are small on the screen are drawn with fewer triangles.
+
+Bounds: rows of a level are vertices of its full part (`place_on_full`), whose arrays are all as long.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32, Intp
+from fba.compiled import compiled
 from fba.mesh.simplify import TOLERANCES
 from fba_player.view._view import FaceMesh, FaceShape
 
@@ -211,7 +215,18 @@ def _faces(meshes: list[FaceMesh]) -> list[list[int]]:
 
 def _mean(values: Float32, rows: Int32, weights: Float32) -> Float32:
     """Return the weighted means (M, C) of rows (M, 3) of values (V, C)."""
-    return np.asarray(np.einsum("nk,nkc->nc", weights, values.take(rows, axis=0)))
+    means = np.zeros((len(rows), values.shape[1]), dtype=np.float32)
+    _add_means(values, rows, weights, means)
+    return means
+
+
+@compiled
+def _add_means(values: Float32, rows: Int32, weights: Float32, means: Float32) -> None:
+    for i in range(len(rows)):
+        for k in range(3):
+            row, weight = rows[i, k], weights[i, k]
+            for column in range(values.shape[1]):
+                means[i, column] += weight * values[row, column]
 
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:

@@ -91,13 +91,19 @@ class Lane:
 
 
 def lane_of_visemes(animation: Animation | DecodedFrames) -> Lane | None:
-    """Return the visemes that frames send, with their shares of the blend; None without any."""
+    """Return the visemes that frames send, with their shares of the blend; None without any.
+
+    As the mouth moves evenly from frame to frame, a viseme begins halfway between the frame that sends it and
+    the frame before it.
+    """
     face = animation.face
     if face is None:
         return None
     blend = np.clip(face.viseme[:, 2] / np.float32(INTENSITY_MAX), 0.0, 1.0)
     shares = np.stack([blend, 1 - blend], axis=1)
-    return _lane("visemes", animation, face.mask[:, 0], face.viseme[:, :2], shares, VISEMES)
+    times = animation.index / float(animation.rate)
+    halfway = np.append(times[:1], (times[1:] + times[:-1]) / 2)
+    return _lane("visemes", animation, face.mask[:, 0], face.viseme[:, :2], shares, VISEMES, halfway)
 
 
 def lane_of_expressions(animation: Animation | DecodedFrames) -> Lane | None:
@@ -116,16 +122,18 @@ def _lane(
     selected: Array,
     shares: Array,
     labels: Sequence[str],
+    begins: Float64 | None = None,
 ) -> Lane | None:
     """Return the lane of two names in each frame, in force until the next ones are sent.
 
-    sent: (T,). selected, shares: (T, 2).
+    sent: (T,). selected, shares: (T, 2). begins: seconds (T,), when what a frame sends is shown; default: its
+    time.
     """
     frames = np.flatnonzero(sent)
     if not len(frames):
         return None
     times = animation.index / float(animation.rate)
-    starts = times[frames]
+    starts = (times if begins is None else begins)[frames]
     ends = np.append(starts[1:], times[-1] + 1 / float(animation.rate))
     selected, shares = selected[frames].astype(np.int64), shares[frames].astype(np.float32)
     same = selected[:, 0] == selected[:, 1]  # one name twice

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -23,6 +24,8 @@ from fba_player.view._view import Extras, View, Wipe
 from fba_player.view.protocols import Timed
 
 if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
+
     from fba.animation import Animation
     from fba.face import FaceModel
     from fba_player._figure.face import FaceFigure
@@ -197,7 +200,7 @@ class CompareScene(Timed[CompareTimeline]):
             return self._over(times)
         if self._arrangement == "wipe":
             return self._wiped(times)
-        views = [scene.view_at(own) for scene, own in zip(self.scenes, times, strict=True)]
+        views = list(self._threads.map(lambda scene, own: scene.view_at(own), self.scenes, times))
         most = 0.0
         if self._arrangement == "colour" and len(views) > 1:
             most = self._most()
@@ -213,6 +216,14 @@ class CompareScene(Timed[CompareTimeline]):
             return joined
         legend = heat_legend("Difference", "mm from the first", most * 1000)
         return replace(joined, extras=replace(joined.extras or Extras(), legend=legend))
+
+    @cached_property
+    def _threads(self) -> ThreadPoolExecutor:
+        """What poses the figures, on all processors: compiled loops run beside each other."""
+        from concurrent.futures import ThreadPoolExecutor
+
+        again = len(set(self.scenes)) < len(self.scenes)  # a scene has only one pose at a time
+        return ThreadPoolExecutor(1 if again else os.cpu_count(), thread_name_prefix="fba pose")
 
     @property
     def _in_a_row(self) -> bool:

@@ -73,12 +73,13 @@ class Scene(Timed[Timeline]):
         self._extent: tuple[str | None, Extent] | None = None
         self._sampled_frames = 0  # number of frames when the extent was sampled
         if animation.body is not None:
-            from fba.body import BodyModel, GroundedPoser
+            from fba.body import BodyModel
+            from fba_player._figure.posing import FigurePoser
             from fba_player.scene._bones import Bones
 
             self._body = body or BodyModel.default()
             self._skeleton = self._body.skeleton
-            self._poser = GroundedPoser(self._skeleton, axes)
+            self._poser = FigurePoser(self._body, axes)
             self._bones = Bones.from_skeleton(self._skeleton)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -175,7 +176,7 @@ class Scene(Timed[Timeline]):
 
     def view_for(self, faps: Float32, baps: Float64) -> View:
         """Return the view for FAPs (68,), as `fba.face.resolve` gives them, and BAPs (296,), if any."""
-        return self._make_view(faps, self._poser.pose(baps) if self.has_body else None)
+        return self._make_view(faps, self._joints(baps) if self.has_body else None)
 
     def still(self, faps: Float32) -> View:
         """Return the view for FAPs (68,), in the body's pose at the start."""
@@ -246,7 +247,13 @@ class Scene(Timed[Timeline]):
         faps = self.timeline.faps(time)
         if not self.has_body:
             return faps, None
-        return faps, self._poser.pose(self.timeline.baps(time))
+        return faps, self._joints(self.timeline.baps(time))
+
+    def _joints(self, baps: Float64) -> Float64:
+        """Return joint matrices (J, 4, 4) for BAPs (296,); as points they are shown as the BAPs say."""
+        return (
+            self._poser.plain.pose(baps) if self._view == "points" else self._poser.pose(baps, self.switches)
+        )
 
     def _face_matrix(self, joints: Float64 | None) -> Float64:
         """Return (4, 4): from the face model's frame into the world, without the head's own turn."""
@@ -259,7 +266,7 @@ class Scene(Timed[Timeline]):
             self._sampled_frames = frames
             sampled = np.unique(np.linspace(0, frames - 1, min(frames, SAMPLES)).astype(int))
             baps = np.stack([self.timeline.baps(float(self.timeline.time_of(int(t)))) for t in sampled])
-            positions = self._poser.pose(baps)[:, :, :3, 3]
+            positions = self._poser.plain.pose(baps)[:, :, :3, 3]
             extent = body_extent(positions, self._skeleton.names, self.person.headroom, follow=self.follow)
             self._extent = (self.follow, extent)
         return self._extent[1]

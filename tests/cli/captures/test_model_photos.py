@@ -14,6 +14,7 @@ from PIL import Image
 from fba.face import FaceModel
 from fba.face.fitting import FRONT_POINTS, _skin, write_photo_points
 from fba.face.fitting._views import View
+from fba.mesh import read_pixels
 from fba.parameters import point_rows
 from fba_player.scene._photo_editing import PhotoEditing
 from fba_player.window import pages
@@ -47,6 +48,17 @@ def test_a_head_is_made_and_measured(run: Run, photo: Path) -> None:
     code, out, _ = run("model", "photos", photo, "-o", out_file, "--points", points, "--json")
     assert code == 0
     assert len(json.loads(out)["measures"]) == 14
+
+
+def test_a_bald_head_has_no_hair(run: Run, photo: Path) -> None:
+    points, dark = photo.with_name("ada.points.json"), {}
+    for hair in ("keep", "none"):
+        out_file = photo.with_name(f"{hair}.glb")
+        assert run("model", "photos", photo, "-o", out_file, "--points", points, "--hair", hair)[0] == 0
+        pixels = read_pixels(FaceModel.load(out_file).part("skin").material.texture or b"")
+        assert pixels is not None
+        dark[hair] = float((pixels[..., :3].mean(axis=2) < 70).mean())
+    assert dark["none"] < 0.3 * dark["keep"]
 
 
 def test_points_are_edited_before_the_head_is_made(

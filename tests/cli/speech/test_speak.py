@@ -70,6 +70,24 @@ def test_visemes_come_back(suffix: str, run: Run, timings: Path, tmp_path: Path)
         assert [number for number in numbers if number] == [1, 10, 1]
 
 
+def test_curves_of_arkit_are_the_motion_of_the_mouth(run: Run, timings: Path, tmp_path: Path) -> None:
+    first, curves, again = (tmp_path / name for name in ("map.fba", "map.csv", "again.fba"))
+    run("speak", "--timings", timings, "--life", 0, "-o", first)
+    run("convert", first, curves, "--fps", 60)
+    assert run("speak", "--timings", curves, "--life", 1, "-o", again).code == 0
+    meant, shown = (fba.read(path).resample(25).face for path in (first, again))
+    assert meant is not None
+    assert shown is not None
+    count = min(len(meant), len(shown))
+    jaws, gaps = (np.array([resolve(each)[:count, column] for each in (meant, shown)]).T for column in (2, 3))
+    assert np.corrcoef(jaws.T)[0, 1] > 0.95
+    assert np.corrcoef(gaps.T)[0, 1] > 0.9
+    done = run("speak", "--timings", curves, "--coding", "visemes", "--json", "-o", again)
+    assert "visemes are guessed from the motion of its mouth" in done.err
+    names = [phone["name"] for phone in json.loads(done.out)["phones"]]
+    assert (names[0], "AA" in names, names[-1]) == ("SIL", True, "SIL"), "shut, open, shut"
+
+
 def test_a_stream_without_visemes_has_none_to_write(run: Run, timings: Path, tmp_path: Path) -> None:
     run("speak", "--timings", timings, "-o", tmp_path / "map.fba")
     done = run("decode", tmp_path / "map.fba", "--visemes", tmp_path / "map.json")

@@ -63,7 +63,8 @@ def test_a_level_moves_as_the_full_face_does(figure: FaceFigure) -> None:
         at = level.parents[bound]
         np.testing.assert_allclose(coarse.positions[at], skin.positions[bound], atol=1e-5)
         part, parents = level.model.parts[0], level.parents[: len(skin.positions)]
-        rest = Level(part.vertices, part.triangles, parents, parents, part.triangles, part.vertices)
+        gone = np.zeros(len(parents), dtype=bool)
+        rest = Level(part.vertices, part.triangles, parents, parents, part.triangles, part.vertices, gone)
         rows, weights = place_on_level(figure.model.parts[0].vertices, rest)
         off = np.einsum("nk,nkd->nd", weights, coarse.positions[rows]) - skin.positions
         assert np.sqrt((off**2).sum(axis=1).mean()) < 1.2 * level.error

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from fba.animation import Animation
+from fba.parameters import VISEMES
+from fba.speech import Phone, Speech, find_shapes, perform
 from fba.tracks import FaceTrack
 from fba_player.playback._lanes import Lane, lane_of_expressions, lane_of_visemes, lane_picture
 from fba_player.playback._time_zoom import MIN_SHOWN_SECONDS, TimeZoom
@@ -28,18 +33,40 @@ def spoken() -> Animation:
     return Animation(10, np.arange(10, 16), face)  # type: ignore[arg-type]
 
 
-def test_visemes_are_in_force_until_the_next_are_sent() -> None:
+def test_visemes_last_from_halfway_to_the_frame_before_to_halfway_to_the_next() -> None:
+    """The mouth moves evenly between frames; visemes are in force until the next are sent."""
     lane = lane_of_visemes(spoken())
     assert lane is not None
-    assert lane.at(1.05) == [("A:", 1.0)]
-    for time in (1.1, 1.25):  # frame 2 sends none
+    assert lane.at(1.04) == [("A:", 1.0)]
+    for time in (1.06, 1.24):  # frame 2 sends none
         assert lane.at(time) == [("e", pytest.approx(2 / 3)), ("A:", pytest.approx(1 / 3))]
-    assert lane.at(1.35) == [("e", 1.0)]
-    assert lane.at(1.45) == []  # "none" was sent
+    assert lane.at(1.3) == [("e", 1.0)]
+    assert lane.at(1.4) == []  # "none" was sent
     assert lane.at(0.95) == []
     assert lane.text(1.1) == "e 67%, A: 33%"
-    assert lane.named(0.0, 9.0, 0.01) == [(1.0, pytest.approx(1.3), "A:"), (1.1, 1.4, "e")]
-    assert lane.named(1.15, 9.0, 0.2) == [(1.15, 1.4, "e")]  # of the other, too little is visible
+    assert lane.named(0.0, 9.0, 0.01) == [
+        (1.0, pytest.approx(1.25), "A:"),
+        (pytest.approx(1.05), pytest.approx(1.35), "e"),
+    ]
+    assert lane.named(1.15, 9.0, 0.2) == [(1.15, pytest.approx(1.35), "e")]  # of the other, too little
+
+
+def test_the_lane_of_speech_agrees_with_its_phones() -> None:
+    """Sounds as long as the key frames are apart at least, so that none is left out."""
+    names = ["SIL", "M", "AA", "S", "P", "IY", "F", "UW", "T", "OW", "B", "AE", "SIL"]
+    ends = np.cumsum(np.random.default_rng(2).uniform(0.1, 0.2, len(names)))
+    phones = [Phone(name, float(end - 0.1), float(end)) for name, end in zip(names, ends, strict=True)]
+    phones = [replace(each, start=before.end) for before, each in pairwise([phones[0], *phones])]
+    phones[0] = replace(phones[0], start=0.0)
+    speech = Speech(tuple(phones), (), float(ends[-1]))
+    lane = lane_of_visemes(perform(speech, coding="visemes", life=0, keep_goal=False))
+    assert lane is not None
+    shown = [(start, name) for start, _, name in lane.named(0, 9, 0.01)]
+    expected = [shape for shape in find_shapes(phones) if shape.viseme]
+    assert [name for _, name in shown] == [VISEMES[shape.viseme] for shape in expected]
+    late = np.array([start for start, _ in shown]) - [shape.start for shape in expected]
+    assert abs(np.median(late)) <= 0.02
+    assert np.abs(late).max() <= 0.06
 
 
 def test_expressions_last_to_the_end_of_the_last_frame() -> None:

@@ -11,7 +11,7 @@ import pytest
 from fba.animation import Animation
 from fba.errors import FbaWarning
 from fba.face.model import FaceModel
-from fba.parameters import BAP_COUNT, point_rows
+from fba.parameters import BAP_COUNT, bap_numbers, point_rows
 from fba.player import Scene, default_camera
 from fba.tracks import BodyTrack
 from fba_player._figure._face_parts import compute_sway
@@ -207,3 +207,25 @@ def test_the_hips_stay_in_the_middle_of_the_picture() -> None:
     start, later = (np.array(scene.travel(time)) for time in (0.0, 0.36))
     np.testing.assert_allclose(start, 0.0, atol=1e-9)
     assert np.abs(later).max() == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize(("switch", "degrees"), [("contact", -20), ("relaxed", 30)])
+def test_hands_are_shown_outside_the_body_and_at_ease_unless_switched_off(
+    switch: str, degrees: float
+) -> None:
+    """The stream is not changed, and as points it is shown as it is."""
+    turned = {"l_shoulder_abduct": degrees, "r_shoulder_abduct": -degrees}
+    number = bap_numbers()
+    track = body_track([{number[name]: round(np.radians(angle) * 1e5) for name, angle in turned.items()}])
+    sent = track.values.copy()
+    scene = Scene(Animation(25, np.arange(1), None, track))
+    for view, least in (("figure", 0.01), ("points", 0.0)):
+        scene.view = view
+        pictures = []
+        for on in (True, False):
+            scene.show(switch, on)
+            seen = scene.view_at(0.0)
+            places = seen.faces[0].positions if view == "figure" else seen.capsules
+            pictures.append(np.array(places, dtype=np.float64))
+        assert (np.abs(pictures[0] - pictures[1]).max() > least) == (view == "figure")
+    np.testing.assert_array_equal(track.values, sent)

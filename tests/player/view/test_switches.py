@@ -56,7 +56,7 @@ class TestTable:
     def test_every_switch_says_what_it_is(self) -> None:
         assert set(SWITCHES) == {
             "wireframe", "points", "influence", "skeleton", "grid", "normals", "shadows", "wrinkles", "eyes",
-            "teeth", "hair", "background", "lod",
+            "teeth", "hair", "background", "lod", "contact", "relaxed",
         }  # fmt: skip
         keys = [switch.key for switch in SWITCHES.values() if switch.key]
         assert len(keys) == len(set(keys))

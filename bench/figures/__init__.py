@@ -1,0 +1,1 @@
+"""Benchmarks of faces, bodies and what moves them."""

@@ -1,0 +1,359 @@
+"""Hands outside the body: for display, arms are turned until hands and forearms leave thighs and trunk.
+
+A motion was made for other proportions than those of the body that shows it, whose hands then reach into its
+clothes. Legs and trunk are measured in the default posture, as radii about vertical lines that move with a
+joint each; points of hands and forearms are kept outside. Shoulder and wrist turn for it, by damped least
+squares in a fixed number of small steps: the result depends on the pose alone, and changes smoothly with it.
+
+Bounds: `find_contact` makes all arrays for the joints of one skeleton, and `Contact.keep_apart` takes no
+matrices of another shape; angles are in 0..1 turn, and heights are checked before radii are looked up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from fba.arrays import Bool, Float64, Int64
+from fba.body._skeleton import SIDES
+from fba.compiled import compiled, inlined
+
+if TYPE_CHECKING:
+    from fba.body._model import BodyModel
+
+OBSTACLES = (
+    ("sacroiliac", "l_hip", -0.06, "vl5", 0.06),
+    ("vl2", "vl5", 0.0, "vt11", 0.05),
+    ("vt9", "vt12", 0.0, "vt5", 0.03),
+    ("vt4", "vt8", 0.0, "vt1", 0.0),
+    ("l_hip", "l_knee", -0.04, "l_hip", 0.06), ("r_hip", "r_knee", -0.04, "r_hip", 0.06),
+    ("l_knee", "l_ankle", 0.06, "l_knee", 0.06), ("r_knee", "r_ankle", 0.06, "r_knee", 0.06),
+)  # fmt: skip
+"""Joint that carries a part of the body; joints at its lower and its upper end, and metres above each."""
+LEVELS, AROUND = 20, 32
+"""Heights and directions in which radii are measured."""
+FADE = 0.04
+"""Metres over which radii shrink to 0 beyond both ends of a part."""
+WIDEST = 0.24
+"""Largest radius of a part, metres: wide robes do not keep hands away."""
+ARM_SHARE = 0.3
+"""Weight of the arm from which a vertex does not belong to the trunk."""
+HAND_POINTS, FOREARM_POINTS = 80, 10
+"""Points of each arm that are kept outside."""
+FOREARM = 0.3
+"""Share of the forearm, from the elbow, that is not looked at."""
+MARGIN = 0.008
+"""Metres that these points keep from the body."""
+STEPS = 24
+"""Steps of the correction."""
+DAMPING = (0.5, 0.6)
+"""Metres: damping of the turns of shoulder and wrist."""
+LARGEST = (0.10, 0.05)
+"""Radians: largest turn of shoulder and wrist in a step."""
+OUTWARDS = (0.6, 0.6)
+"""How much points are pushed to their arm's side, and ahead, besides away from the middle of what they are
+in: one on the far side of that middle comes out where arms come from, without a jump."""
+
+
+class Parts(NamedTuple):
+    """O parts of a body: joints (O,), middles (O, 2), x and z of their lines, and ends (O, 2), lowest and
+    highest y, all relative to the joint; radii (O, LEVELS, AROUND), metres; widest (O,), of these."""
+
+    joints: Int64
+    middles: Float64
+    ends: Float64
+    radii: Float64
+    widest: Float64
+
+
+class Points(NamedTuple):
+    """P points of an arm: joints (P,) and positions (P, 3) relative to them, in the default posture."""
+
+    joints: Int64
+    positions: Float64
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """What keeps hands outside one body; see `find_contact`.
+
+    arms: for each the joints that its shoulder carries, those that its wrist carries, its points, and 1 for
+    the left one, -1 for the right.
+    """
+
+    parts: Parts
+    arms: tuple[tuple[Int64, Int64, Points, float], ...]
+    joints: int
+
+    def keep_apart(self, matrices: Float64) -> Float64:
+        """Turn arms in matrices (J, 4, 4) in place; return (arms, 2, 3), the turns of shoulder and wrist.
+
+        matrices: float64, C-contiguous, as `BapSolver.pose` returns them. A turn is a vector along its axis,
+        its length the angle in radians; zeros where nothing touches. ValueError for another shape.
+        """
+        if matrices.shape != (self.joints, 4, 4):
+            raise ValueError(f"joint matrices must have shape ({self.joints}, 4, 4), not {matrices.shape}")
+        turns = np.zeros((len(self.arms), 2, 3))
+        for arm, (carried, hand, points, side) in enumerate(self.arms):
+            push_out(matrices, self.parts, carried, hand, points, side, turns[arm])
+        return turns
+
+    def depths(self, matrices: Float64) -> Float64:
+        """Return (arms,) metres by which the deepest point of each arm is inside the body; 0 for outside."""
+        found = np.zeros(len(self.arms))
+        for arm, (_, _, points, side) in enumerate(self.arms):
+            for point in range(len(points.joints)):
+                place = _place(matrices, points, point)
+                for part in range(len(self.parts.joints)):
+                    inside = _depth(matrices, self.parts, part, place, side)[0] - MARGIN
+                    found[arm] = max(found[arm], inside)
+        return found
+
+
+def find_contact(body: BodyModel) -> Contact | None:
+    """Return what keeps hands outside a body; None for one without arms, hands, thighs or trunk."""
+    skeleton = body.skeleton
+    standing = np.tile(np.eye(4), (len(skeleton), 1, 1))
+    standing[:, :3, 3] = skeleton.centres
+    vertices = body.skin(standing).astype(np.float64)
+    arm = np.zeros(len(vertices))
+    arms = []
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        names = [f"{side}_{name}" for name in ("shoulder", "elbow", "wrist")]
+        if not all(name in skeleton for name in names):
+            continue
+        shoulder, elbow, wrist = (skeleton.number(name) for name in names)
+        arm += _share(body, skeleton.descendants(shoulder))
+        hand = skeleton.descendants(wrist)
+        fraction = (skeleton.centres[elbow, 1] - vertices[:, 1]) / max(
+            float(skeleton.centres[elbow, 1] - skeleton.centres[wrist, 1]), 1e-6
+        )
+        strongest = body.joints[:, 0]
+        rows = np.concatenate([
+            _spread(vertices, np.isin(strongest, hand), HAND_POINTS),
+            _spread(vertices, (strongest == elbow) & (fraction > FOREARM), FOREARM_POINTS),
+        ])  # fmt: skip
+        if len(rows):
+            joints = strongest[rows].astype(np.int64)
+            points = Points(joints, vertices[rows] - skeleton.centres[joints])
+            arms.append((np.array(skeleton.descendants(shoulder)), np.array(hand), points, sign))
+    parts = _measure_parts(body, vertices, arm)
+    return Contact(parts, tuple(arms), len(skeleton)) if arms and len(parts.joints) else None
+
+
+def _share(body: BodyModel, joints: Sequence[int]) -> Float64:
+    """Return (V,) the weight of some joints on each vertex."""
+    return np.asarray((body.weights * np.isin(body.joints, joints)).sum(axis=1), dtype=np.float64)
+
+
+def _spread(vertices: Float64, chosen: Bool, count: int) -> Int64:
+    """Return up to `count` of the chosen vertices, each as far as possible from those before it."""
+    rows = np.flatnonzero(chosen)
+    if not len(rows):
+        return rows
+    away = np.linalg.norm(vertices[rows] - vertices[rows].mean(axis=0), axis=1)
+    found = [int(away.argmax())]
+    for _ in range(min(count, len(rows)) - 1):
+        last = np.linalg.norm(vertices[rows] - vertices[rows[found[-1]]], axis=1)
+        away = last if len(found) == 1 else np.minimum(away, last)
+        found.append(int(away.argmax()))
+    return np.asarray(rows[found])
+
+
+def _measure_parts(body: BodyModel, vertices: Float64, arm: Float64) -> Parts:
+    """Return the parts of a body in the default posture. vertices (V, 3); arm (V,): weight of the arms."""
+    skeleton = body.skeleton
+    rows = []
+    for joint, low, above_low, high, above_high in OBSTACLES:
+        if not all(name in skeleton for name in (joint, low, high)):
+            continue
+        number = skeleton.number(joint)
+        if joint[:2] in ("l_", "r_"):
+            own = np.setdiff1d(skeleton.descendants(number), skeleton.descendants(skeleton.number(low)))
+            chosen = _share(body, own.tolist()) > 0.5
+        else:
+            chosen = arm < ARM_SHARE
+        centre = skeleton.centres[number]
+        ends = [skeleton.centres[skeleton.number(low), 1] + above_low,
+                skeleton.centres[skeleton.number(high), 1] + above_high]  # fmt: skip
+        samples = _samples(vertices, body.triangles[chosen[body.triangles].all(axis=1)])
+        samples = samples[(samples[:, 1] > ends[0]) & (samples[:, 1] < ends[1])] - centre
+        if len(samples):
+            ends = [end - centre[1] for end in ends]
+            middle = (samples[:, [0, 2]].min(axis=0) + samples[:, [0, 2]].max(axis=0)) / 2
+            rows.append((number, middle, ends, _radii(samples - [middle[0], 0, middle[1]], ends)))
+    joints, middles, lines, radii = zip(*rows, strict=True) if rows else ((), (), (), ())
+    table = np.array(radii, dtype=np.float64).reshape(-1, LEVELS, AROUND)
+    return Parts(
+        np.array(joints, dtype=np.int64),
+        np.array(middles, dtype=np.float64).reshape(-1, 2),
+        np.array(lines, dtype=np.float64).reshape(-1, 2),
+        table,
+        table.max(axis=(1, 2)) if len(table) else np.zeros(0),
+    )
+
+
+def _samples(vertices: Float64, triangles: Int64) -> Float64:
+    """Return (N, 3) points spread over triangles (F, 3)."""
+    steps = 5
+    shares = np.array([(a, b, steps - a - b) for a in range(steps + 1) for b in range(steps + 1 - a)]) / steps
+    return np.asarray(np.einsum("sk,fkd->fsd", shares, vertices[triangles]).reshape(-1, 3))
+
+
+def _radii(samples: Float64, ends: Sequence[float]) -> Float64:
+    """Return (LEVELS, AROUND) radii of points (N, 3) about the y axis; gaps take those beside them."""
+    level = np.rint((samples[:, 1] - ends[0]) / (ends[1] - ends[0]) * (LEVELS - 1)).astype(int)
+    turn = np.arctan2(samples[:, 0], samples[:, 2]) / (2 * np.pi) % 1
+    column = np.rint(turn * AROUND).astype(int) % AROUND
+    radii = np.zeros((LEVELS, AROUND))
+    np.maximum.at(radii, (level, column), np.hypot(samples[:, 0], samples[:, 2]))
+    for _ in range(LEVELS):
+        beside = np.maximum(np.roll(radii, 1, axis=1), np.roll(radii, -1, axis=1))
+        padded = np.pad(radii, ((1, 1), (0, 0)))
+        radii = np.where(radii > 0, radii, np.where(beside > 0, beside, np.maximum(padded[2:], padded[:-2])))
+    return np.minimum(radii, WIDEST)
+
+
+@inlined
+def _place(matrices: Float64, points: Points, point: int) -> tuple[float, float, float]:
+    """Return where a point is."""
+    j = points.joints[point]
+    x, y, z = points.positions[point, 0], points.positions[point, 1], points.positions[point, 2]
+    m = matrices
+    return (
+        m[j, 0, 0] * x + m[j, 0, 1] * y + m[j, 0, 2] * z + m[j, 0, 3],
+        m[j, 1, 0] * x + m[j, 1, 1] * y + m[j, 1, 2] * z + m[j, 1, 3],
+        m[j, 2, 0] * x + m[j, 2, 1] * y + m[j, 2, 2] * z + m[j, 2, 3],
+    )
+
+
+@inlined
+def _depth(
+    matrices: Float64, parts: Parts, part: int, place: tuple[float, float, float], side: float
+) -> tuple[float, float, float, float]:
+    """Return by how much a point is inside a part with its margin, metres, and the direction out of it."""
+    j, m = parts.joints[part], matrices
+    a, b, c = place[0] - m[j, 0, 3], place[1] - m[j, 1, 3], place[2] - m[j, 2, 3]
+    y = m[j, 0, 1] * a + m[j, 1, 1] * b + m[j, 2, 1] * c
+    low, high = parts.ends[part, 0], parts.ends[part, 1]
+    if not (low - FADE <= y <= high + FADE):  # written so that NaN is outside
+        return -1.0, 0.0, 0.0, 0.0
+    x = m[j, 0, 0] * a + m[j, 1, 0] * b + m[j, 2, 0] * c - parts.middles[part, 0]
+    z = m[j, 0, 2] * a + m[j, 1, 2] * b + m[j, 2, 2] * c - parts.middles[part, 1]
+    away = np.sqrt(x * x + z * z)
+    if not away <= parts.widest[part] + MARGIN:
+        return -1.0, 0.0, 0.0, 0.0
+    t = min(max((low - y) / FADE, (y - high) / FADE, 0.0), 1.0)
+    fade = 1.0 - t * t * (3.0 - 2.0 * t)
+    at = min(max((y - low) / (high - low), 0.0), 1.0) * (LEVELS - 1)
+    row = min(int(at), LEVELS - 2)
+    up = at - row
+    turn = np.arctan2(x, z) / (2.0 * np.pi) * AROUND
+    turn = turn + AROUND if turn < 0.0 else turn
+    first = int(turn) % AROUND
+    on = turn - int(turn)
+    second = (first + 1) % AROUND
+    lower = parts.radii[part, row, first] * (1.0 - on) + parts.radii[part, row, second] * on
+    upper = parts.radii[part, row + 1, first] * (1.0 - on) + parts.radii[part, row + 1, second] * on
+    radius = (lower * (1.0 - up) + upper * up + MARGIN) * fade
+    depth = radius - away
+    if depth <= 0.0:
+        return -1.0, 0.0, 0.0, 0.0
+    # Away from the middle, the more to the side and ahead the deeper it is.
+    deep = depth / radius
+    nx, nz = x / radius + OUTWARDS[0] * side * deep, z / radius + OUTWARDS[1] * deep
+    length = max(np.sqrt(nx * nx + nz * nz), 0.1)
+    nx, nz = nx / length, nz / length
+    return (
+        depth,
+        m[j, 0, 0] * nx + m[j, 0, 2] * nz,
+        m[j, 1, 0] * nx + m[j, 1, 2] * nz,
+        m[j, 2, 0] * nx + m[j, 2, 2] * nz,
+    )
+
+
+@compiled
+def push_out(
+    matrices: Float64, parts: Parts, carried: Int64, hand: Int64, points: Points, side: float, turns: Float64
+) -> None:
+    """Turn shoulder and wrist of an arm in place, and add up the turns in (2, 3), until it is outside."""
+    shoulder, wrist = carried[0], hand[0]
+    normal, wanted, row = np.zeros((6, 6)), np.zeros(6), np.zeros(6)
+    for _ in range(STEPS):
+        normal[:], wanted[:] = 0.0, 0.0
+        deepest = 0.0
+        for point in range(len(points.joints)):
+            place = _place(matrices, points, point)
+            of_hand = points.joints[point] >= wrist
+            for part in range(len(parts.joints)):
+                depth, nx, ny, nz = _depth(matrices, parts, part, place, side)
+                if depth <= 0.0:
+                    continue
+                deepest = max(deepest, depth)
+                for k in range(2):
+                    joint = shoulder if k == 0 else wrist
+                    x = place[0] - matrices[joint, 0, 3]
+                    y = place[1] - matrices[joint, 1, 3]
+                    z = place[2] - matrices[joint, 2, 3]
+                    held = 1.0 if k == 0 or of_hand else 0.0
+                    row[3 * k] = held * (y * nz - z * ny)
+                    row[3 * k + 1] = held * (z * nx - x * nz)
+                    row[3 * k + 2] = held * (x * ny - y * nx)
+                for i in range(6):
+                    wanted[i] += row[i] * depth * depth
+                    for k in range(6):
+                        normal[i, k] += row[i] * row[k] * depth
+        if deepest <= 0.0:
+            return
+        for i in range(6):
+            damping = DAMPING[0] if i < 3 else DAMPING[1]
+            normal[i, i] += damping * damping * deepest
+        _solve(normal, wanted)
+        _turn(matrices, carried, wanted[:3], LARGEST[0], turns[0])
+        _turn(matrices, hand, wanted[3:], LARGEST[1], turns[1])
+
+
+@inlined
+def _solve(normal: Float64, wanted: Float64) -> None:
+    """Solve normal (6, 6), symmetric and positive, for wanted (6,), in place."""
+    for i in range(6):
+        for k in range(i + 1, 6):
+            factor = normal[k, i] / normal[i, i]
+            for n in range(i, 6):
+                normal[k, n] -= factor * normal[i, n]
+            wanted[k] -= factor * wanted[i]
+    for i in range(5, -1, -1):
+        for k in range(i + 1, 6):
+            wanted[i] -= normal[i, k] * wanted[k]
+        wanted[i] /= normal[i, i]
+
+
+@inlined
+def _turn(matrices: Float64, joints: Int64, turn: Float64, largest: float, turns: Float64) -> None:
+    """Turn joints about the first of them, in place, by a vector (3,), shortened to at most largest."""
+    size = np.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
+    if size < 1e-12:
+        return
+    angle = size / (1.0 + size / largest)
+    x, y, z = turn[0] / size, turn[1] / size, turn[2] / size
+    turns[0] += angle * x
+    turns[1] += angle * y
+    turns[2] += angle * z
+    sine, cosine = np.sin(angle), np.cos(angle)
+    first = joints[0]
+    px, py, pz = matrices[first, 0, 3], matrices[first, 1, 3], matrices[first, 2, 3]
+    for j in joints:
+        for column in range(4):
+            a, b, c = matrices[j, 0, column], matrices[j, 1, column], matrices[j, 2, column]
+            if column == 3:
+                a, b, c = a - px, b - py, c - pz
+            along = (x * a + y * b + z * c) * (1.0 - cosine)
+            d = cosine * a + sine * (y * c - z * b) + along * x
+            e = cosine * b + sine * (z * a - x * c) + along * y
+            f = cosine * c + sine * (x * b - y * a) + along * z
+            if column == 3:
+                d, e, f = d + px, e + py, f + pz
+            matrices[j, 0, column], matrices[j, 1, column], matrices[j, 2, column] = d, e, f

@@ -1,0 +1,131 @@
+"""Hands are kept outside the body where it is shown, smoothly, and other bodies are not harmed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fba
+from fba import figures
+from fba.arrays import Float64
+from fba.body import BapSolver, BodyModel, GroundedPoser, Skeleton
+from fba.body.contact import Contact, find_contact
+from fba.parameters import BAP_COUNT, bap_numbers
+from small_bodies import rod
+from tools.figure_checks import HAND_DEPTH, hand_depths
+
+INWARDS = {"l_shoulder_abduct": -20, "r_shoulder_abduct": 20}
+CHEST = {"l_shoulder_flexion": 10, "l_elbow_flexion": 100, "l_shoulder_twisting": 75}
+SITTING = {
+    f"{side}_{name}": angle
+    for side in "lr"
+    for name, angle in (
+        ("hip_flexion", 90),
+        ("knee_flexion", -90),
+        ("shoulder_flexion", 5),
+        ("elbow_flexion", 30),
+    )
+}
+"""Degrees of BAPs."""
+CLIPS = (("greta/Dance.bvh", 60), ("greta/GangnamStyle.bvh", 95), ("greta/strong_gesture.bvh", 100),
+         ("greta/c-Walkaround.bvh", 60), ("vreng/clap.bap", 6))  # fmt: skip
+"""Recordings, and of how many frames one is looked at."""
+
+
+def angles(degrees: dict[str, float]) -> Float64:
+    values = np.zeros(BAP_COUNT)
+    for name, angle in degrees.items():
+        values[bap_numbers()[name] - 1] = np.radians(angle) * 1e5
+    return values
+
+
+@pytest.fixture(scope="module")
+def body() -> BodyModel:
+    return BodyModel.default()
+
+
+@pytest.fixture(scope="module")
+def contact(body: BodyModel) -> Contact:
+    found = find_contact(body)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("name", figures.FIGURES)
+def test_at_rest_hands_are_outside_without_help(name: str) -> None:
+    figure = figures.body(name)
+    assert hand_depths(figure, BapSolver(figure.skeleton).pose(np.zeros(BAP_COUNT)))[0] == 0
+
+
+@pytest.mark.parametrize("degrees", [INWARDS, CHEST, SITTING])
+def test_hands_come_out_and_nothing_else_moves(
+    body: BodyModel, contact: Contact, degrees: dict[str, float]
+) -> None:
+    joints = BapSolver(body.skeleton).pose(angles(degrees))
+    kept = joints.copy()
+    turns = contact.keep_apart(kept)
+    assert contact.depths(joints).max() > 0.001
+    assert contact.depths(kept).max() < HAND_DEPTH
+    assert np.linalg.norm(turns, axis=2).max() < np.radians(45)
+    arms = [body.skeleton.descendants(body.skeleton.number(f"{side}_shoulder")) for side in "lr"]
+    others = np.setdiff1d(np.arange(len(joints)), np.concatenate(arms))
+    np.testing.assert_array_equal(kept[others], joints[others])
+    turned = kept[:, :3, :3]
+    np.testing.assert_allclose(
+        turned @ turned.transpose(0, 2, 1), np.tile(np.eye(3), (len(kept), 1, 1)), atol=1e-9
+    )
+
+
+def test_arms_that_touch_nothing_are_not_moved(body: BodyModel, contact: Contact) -> None:
+    joints = BapSolver(body.skeleton).pose(angles({"l_shoulder_abduct": 60, "r_shoulder_abduct": -60}))
+    kept = joints.copy()
+    assert not contact.keep_apart(kept).any()
+    np.testing.assert_array_equal(kept, joints)
+
+
+@pytest.mark.filterwarnings("ignore::fba.errors.FbaWarning")
+def test_hands_stay_outside_in_recordings(shared: Path, body: BodyModel, contact: Contact) -> None:
+    poser = GroundedPoser(body.skeleton)
+    before, after = 0.0, 0.0
+    for name, every in CLIPS:
+        track = fba.read(shared / "data" / name).body
+        assert track is not None
+        for joints in poser.pose(track.values[::every]):
+            before = max(before, hand_depths(body, joints)[0])
+            contact.keep_apart(joints)
+            after = max(after, hand_depths(body, joints)[0])
+    assert before > 0.02
+    assert after < HAND_DEPTH
+
+
+def test_a_smooth_motion_stays_smooth(body: BodyModel, contact: Contact) -> None:
+    """An arm that brushes the thigh: in 120 steps of 0.7 degrees, no correction changes by more than 3."""
+    ends = [angles({"l_shoulder_abduct": -8, "l_shoulder_flexion": angle}) for angle in (-40, 45)]
+    swing = np.linspace(*ends, 120)
+    turns = np.array([contact.keep_apart(joints) for joints in BapSolver(body.skeleton).pose(swing)])
+    assert turns.any()
+    assert np.degrees(np.linalg.norm(np.diff(turns, axis=0), axis=3)).max() < 3
+
+
+def test_bodies_without_hands_or_legs_have_no_contact(body: BodyModel) -> None:
+    assert find_contact(rod()) is None
+    names = tuple(name.replace("_wrist", "_end") for name in body.skeleton.names)
+    handless = replace(body, skeleton=Skeleton(names, body.skeleton.parents, body.skeleton.centres))
+    assert find_contact(handless) is None
+    one = tuple(name.replace("r_wrist", "r_end") for name in body.skeleton.names)
+    armed = find_contact(replace(body, skeleton=Skeleton(one, body.skeleton.parents, body.skeleton.centres)))
+    assert armed is not None
+    assert len(armed.arms) == 1
+
+
+def test_other_shapes_are_named_and_numbers_that_are_none_harm_nothing(contact: Contact) -> None:
+    with pytest.raises(ValueError, match=r"shape \(87, 4, 4\), not \(3, 4, 4\)"):
+        contact.keep_apart(np.zeros((3, 4, 4)))
+    for value in (np.nan, np.inf, 1e300):
+        contact.keep_apart(np.full((contact.joints, 4, 4), value))
+    random = np.random.default_rng(5)
+    for _ in range(50):
+        contact.keep_apart(random.normal(scale=0.3, size=(contact.joints, 4, 4)))
