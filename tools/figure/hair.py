@@ -72,7 +72,11 @@ def combed(p: Float64) -> Float64:
     over = smoothstep((p[:, 1] - 0.045) / 0.045)[:, None] * smoothstep((p[:, 2] + 0.17) / 0.05)[:, None]
     across = np.stack([side, np.full(len(p), -0.25), np.full(len(p), -0.55)], axis=1)
     down = np.stack([np.zeros(len(p)), np.full(len(p), -1.0), np.full(len(p), -0.45)], axis=1)
-    return over * across + (1 - over) * down
+    # At the forehead hair grows upwards and back, before it falls to the side.
+    back = np.stack([side * 0.35, np.full(len(p), 1.0), np.full(len(p), -0.5)], axis=1)
+    front = smoothstep((0.016 - height_above_hairline(p)) / 0.012) * smoothstep((p[:, 1] - 0.03) / 0.03)
+    front = (front * smoothstep((p[:, 2] + 0.075) / 0.03))[:, None]
+    return front * back + (1 - front) * (over * across + (1 - over) * down)
 
 
 def in_parting(p: Float64) -> Float64:

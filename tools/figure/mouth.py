@@ -17,9 +17,7 @@ GUM = np.array([0.52, 0.165, 0.145])
 TONGUE = np.array([0.50, 0.170, 0.155])
 TONGUE_UNDER = np.array([0.34, 0.09, 0.09])
 HALF_WIDTH, DEPTH = 0.0272, 0.0400
-"""Half axes of the outer edge of the upper arch of teeth, metres."""
-SQUARENESS = 2.4
-"""Its exponent: 2 would be half an ellipse, more is squarer at the canines."""
+"""Half axes of the outer edge of the upper arch of teeth, half an ellipse, metres."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
 AROUND = 12
@@ -60,14 +58,12 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
 def _arch(length: float, inset: float) -> tuple[Float64, float]:
     """Return position (3,) from the front, and turn about y, at a length along the arch from its middle."""
     angle = np.linspace(0, np.pi / 2, 400)
-    power = 2 / SQUARENESS
-    x, z = (HALF_WIDTH - inset) * np.sin(angle) ** power, -DEPTH * (1 - np.cos(angle) ** power) - inset
+    x, z = (HALF_WIDTH - inset) * np.sin(angle), -DEPTH * (1 - np.cos(angle)) - inset
     run = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
     beyond = max(length - run[-1], 0.0)
     px, pz = np.interp(length, run, x), np.interp(length, run, z) - beyond
-    turn = np.arctan2(-np.gradient(z, run), np.gradient(x, run))
-    turn[0] = 0.0  # on the midline
-    return np.array([px, 0.0, pz]), float(np.interp(length, run, turn))
+    tangent = np.interp(length, run, angle)
+    return np.array([px, 0.0, pz]), float(np.arctan2(DEPTH * np.sin(tangent), HALF_WIDTH * np.cos(tangent)))
 
 
 def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
@@ -105,7 +101,7 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1]])
     # Between the teeth it is darker.
     side = np.concatenate([np.tile(np.abs(cx) ** 8, len(rows)), [0.0]])
-    colours = colours * (1 - side[:, None] * (0.30, 0.36, 0.40))
+    colours = colours * (1 - side[:, None] * (0.52, 0.60, 0.64))
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 
@@ -196,9 +192,12 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     ]
     under = np.clip(0.5 - cy, 0, 1)[None, :, None]
     colours = TONGUE * (1 - under) + TONGUE_UNDER * under
-    colours = colours * (0.40 + 0.60 * t[:, None, None])
+    # Darker, and redder, towards the throat; pale papillae on its back, and a dark groove along its middle.
+    colours = colours * (0.16 + 0.84 * t[:, None, None] ** (1.3, 1.6, 1.6))
+    middle = np.exp(-((cx / 0.16) ** 2)) * (cy > 0.3)
+    colours = colours * (1 - 0.42 * (middle * np.clip((1 - t[:, None]) * 8, 0, 1)))[..., None]
     random = np.random.default_rng(5)
-    colours = colours * (1 + 0.12 * (random.random((rings, around, 1)) - 0.5))
+    colours = colours * (1 + 0.30 * (random.random((rings, around, 1)) - 0.5))
     flat_colours = np.concatenate([colours.reshape(-1, 3), [TONGUE * 0.2], [TONGUE]])
     body = int(np.abs(t - 0.568).argmin())
     upward = around // 4

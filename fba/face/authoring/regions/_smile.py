@@ -15,24 +15,23 @@ from fba.face.authoring.surface._motion_limits import human_range, soft_limit, s
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.sampling import smoothstep
 
-STRETCHING = {6: 1.0, 53: 1.0, 7: -1.0, 54: -1.0}
-"""Sign of x towards which each FAP draws a corner of the mouth when positive."""
+STRETCHING = (6, 7, 53, 54)
 RAISING = {12: 1.0, 59: 1.0, 13: -1.0, 60: -1.0}
 """Side of the corner that each FAP raises."""
-KNOTS = (16.0, 150.0)
-"""Values at which the way of a stretched corner bends: an arc, that begins straight to the side."""
-BEND = 4.0
-"""1 / radius of that arc, in 1 / ES0."""
+STRAIGHT = 100.0
+"""Value up to which a stretched corner goes straight to the side; then it meets the teeth."""
+BEND = 0.62
+"""From there on, its way back as a share of its way to the side."""
 THINNING, IN_MIDDLE = 1.9, 0.22
 """Share of a lip's height that goes where it is stretched by the mouth's width; and the share of the corner's
 stretch that counts all along the lip."""
 LIP_HEIGHT = 0.2
 """Distance from the line of contact up to which the height counts, in ES0."""
-BULGE = (1.0, 0.40)
+BULGE = (0.62, 0.40)
 """How far the cheek comes out, and up, as shares of the way of a raised corner."""
-FOLD = -0.30
+FOLD = -0.20
 """The same of the fold beside it."""
-CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.215), ({"8.3": 0.62, "9.1": 0.38}, 0.09)
+CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.13)
 """Where they are: shares of feature points of the left side, and their breadth in ES0."""
 RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
 NEAR, REACH = 0.54, 0.78
@@ -44,20 +43,20 @@ FOLD_OUTWARD = 0.09
 def add_smile(marks: Landmarks, limiter: Limiter, fap: int, motion: Motion) -> Motion:
     """Return the motion of the corner of the mouth by a FAP with what goes along; others as they are."""
     if fap in STRETCHING:
-        return stop_at_folds(limiter, _stretched(marks, _with_knots(motion, STRETCHING[fap])))
+        return stop_at_folds(limiter, _stretched(marks, _with_knot(motion)))
     if fap in RAISING:
         return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], outer=fap > 50))
     return motion
 
 
-def _with_knots(motion: Motion, sign: float) -> Motion:
-    """Return the same motion with `KNOTS` among its values, on the side on which it stretches."""
-    values = np.union1d(motion.values, [k for k in KNOTS if k < motion.values[-1]])
+def _with_knot(motion: Motion) -> Motion:
+    """Return the same motion with `STRAIGHT` among its values."""
+    values = np.union1d(motion.values, [min(STRAIGHT, motion.values[-1])])
     return Motion(values, motion.vertices, np.stack([motion.shifts_at(value) for value in values]))
 
 
 def _stretched(marks: Landmarks, motion: Motion) -> Motion:
-    """Return a stretch along an arc, of lips that grow thinner."""
+    """Return a stretch that bends round the teeth, of lips that grow thinner."""
     surface, es = marks.surface, marks.fapu.ES * 1024
     near = surface.distances(np.flatnonzero(marks.lips | marks.on_inner_lips), 0.2 * es)
     motion = _including(motion, np.flatnonzero((near < 0.2 * es) & ~marks.inside_mouth))
@@ -70,7 +69,7 @@ def _stretched(marks: Landmarks, motion: Motion) -> Motion:
     width = marks.fapu.MW * 1024
     shifts = motion.shifts.copy()
     apart = np.abs(motion.shifts[..., 0]) * (motion.values > 0)[:, None]
-    shifts[..., 2] -= 0.5 * apart**2 * BEND / es
+    shifts[..., 2] -= BEND * np.maximum(apart - np.abs(motion.shifts_at(STRAIGHT)[:, 0]), 0.0)
     thin = apart + IN_MIDDLE * np.maximum(_ways(motion.values, 6) * marks.fapu.MW, 0.0)[:, None]
     shifts[..., 1] -= thin / width * THINNING * height * on_lip
     return Motion(motion.values, motion.vertices, shifts)
