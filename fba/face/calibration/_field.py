@@ -25,8 +25,14 @@ ANCHOR_SMOOTHING = 1e-9
 """Smoothing of the anchors: they keep the far field near zero, not exactly at it."""
 LEAST_VOLUME = 0.04
 """The deformation folds where its local volume is below this share of the usual one."""
-KERNELS = ("thin_plate_spline", "cubic", "linear")
-"""Kernels of the radial basis functions, from the smoothest to the least prone to fold."""
+KERNELS = ("multiquadric", "linear")
+"""Kernels of the radial basis functions, from the smoothest to the least prone to fold.
+
+The distance itself bends space least (it is the biharmonic function of three dimensions), but leaves a tip at
+each source, which the multiquadric rounds.
+"""
+ROUNDING = 0.004
+"""Metres within which the multiquadric rounds these tips."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +79,9 @@ def deformation(sources: Float64, targets: Float64, mesh: Floating, kernel: str,
     left = np.vstack([there - here @ matrix.T, np.zeros((len(anchors), 3))])
     smoothing = np.concatenate([np.zeros(len(sources)), np.full(len(anchors), ANCHOR_SMOOTHING)])
     affine = np.linalg.matrix_rank(centres - centres[0], tol=1e-4) == 3 and len(centres) > 4
-    rest = RBFInterpolator(centres, left, kernel=kernel, smoothing=smoothing, degree=1 if affine else 0)
+    rest = RBFInterpolator(
+        centres, left, kernel=kernel, smoothing=smoothing, degree=1 if affine else 0, epsilon=1 / ROUNDING
+    )
     return Field(matrix, origin, target, rest)
 
 
