@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.speech import add_noise, start_errors, telephone, visemes
+from bench.speech.measures import add_noise, start_errors, telephone, visemes
 from bench.speech.spoken import FLITE, KNOWN, VOICES, speak
 from fba.arrays import Int16
 from fba.audio import read_mono
