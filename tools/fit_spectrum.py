@@ -20,7 +20,7 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from bench.speech import add_noise, telephone, visemes  # noqa: E402
+from bench.speech.measures import add_noise, telephone, visemes  # noqa: E402
 from bench.speech.spoken import FLITE, KNOWN, speak  # noqa: E402
 from fba.arrays import Float64, Int16, Int64  # noqa: E402
 from fba.audio import read_mono  # noqa: E402

@@ -124,7 +124,7 @@ def draw_lane(axes: Axes, phones: Sequence[Phone], words: Sequence[Word]) -> Non
         )  # fmt: skip
         axes.add_patch(box)
         middle = (phone.start + phone.end) / 2
-        size = 15 if length > 0.05 else 11 if length > 0.043 else 8
+        size = 15 if length > 0.06 else 11 if length > 0.043 else 8
         axes.text(
             middle, 0.31, phone.name, ha="center", va="center", fontsize=size, color=PAPER, weight="bold"
         )

@@ -107,7 +107,10 @@ def find_speech(
 
 
 def _unfit(share: float, count: int, missed: Sequence[Word]) -> str:
-    where = ", ".join(f"{word.text!r} at {word.start:.1f} s" for word in missed[:MISSED_NAMED])
+    where = ", ".join(
+        f"{word.text!r} at {word.start:.1f} s" if word.end > word.start else repr(word.text)  # no place found
+        for word in missed[:MISSED_NAMED]
+    )
     return (
         f"the text does not fit the sound: {share:.0%} of its {count} words are heard; missing are "
         f"{where}{' and more' * (len(missed) > MISSED_NAMED)}; give the words that are spoken, or no text"

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.speech.__main__ import add_noise, start_errors, telephone, visemes
+from bench.speech.measures import add_noise, start_errors, telephone, visemes
 from bench.speech.spoken import FLITE, KNOWN, VOICES, speak
 from fba.arrays import Int16
 from fba.audio import read_mono
@@ -73,6 +73,8 @@ def test_a_text_that_does_not_fit_is_refused_with_the_words_that_are_missing(tmp
         FormatError, match=r"does not fit the sound: \d+% of its 8 words.*missing are 'yesterday'"
     ):
         find_speech([sound], split_text(KNOWN[8])[:7] + split_text("indeed"))
+    with pytest.raises(FormatError, match=r"0% of its 7 words are heard; missing are '\w+', '"):
+        find_speech([np.zeros(RATE, dtype=np.int16)], split_text(KNOWN[8])[:7])
     noisy = find_speech([add_noise(sound)], split_text(KNOWN[0]))
     assert noisy.found is not None
     assert noisy.found > 0.7, "the right text is heard in noise, too"

@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from bench.speech.__main__ import visemes
+from bench.speech.measures import visemes
 from bench.speech.spoken import KNOWN, speak
 from fba.animation import Animation
 from fba.arrays import Int16
