@@ -101,7 +101,7 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1]])
     # Between the teeth it is darker.
     side = np.concatenate([np.tile(np.abs(cx) ** 8, len(rows)), [0.0]])
-    colours = colours * (1 - side[:, None] * (0.30, 0.36, 0.40))
+    colours = colours * (1 - side[:, None] * (0.52, 0.60, 0.64))
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 
@@ -192,9 +192,12 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     ]
     under = np.clip(0.5 - cy, 0, 1)[None, :, None]
     colours = TONGUE * (1 - under) + TONGUE_UNDER * under
-    colours = colours * (0.40 + 0.60 * t[:, None, None])
+    # Darker, and redder, towards the throat; pale papillae on its back, and a dark groove along its middle.
+    colours = colours * (0.16 + 0.84 * t[:, None, None] ** (1.3, 1.6, 1.6))
+    middle = np.exp(-((cx / 0.16) ** 2)) * (cy > 0.3)
+    colours = colours * (1 - 0.42 * (middle * np.clip((1 - t[:, None]) * 8, 0, 1)))[..., None]
     random = np.random.default_rng(5)
-    colours = colours * (1 + 0.12 * (random.random((rings, around, 1)) - 0.5))
+    colours = colours * (1 + 0.30 * (random.random((rings, around, 1)) - 0.5))
     flat_colours = np.concatenate([colours.reshape(-1, 3), [TONGUE * 0.2], [TONGUE]])
     body = int(np.abs(t - 0.568).argmin())
     upward = around // 4

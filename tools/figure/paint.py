@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from hair import AXIS, combed, in_parting, noise, scalp
-from looks import ALEX, Looks
+from looks import ALEX, Hair, Looks
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
@@ -23,6 +23,10 @@ HAIR_WIDTH = 0.00023
 """Metres."""
 STROKES = 190000
 """Of the head's hair."""
+SOFT_EDGE = 0.019
+"""Metres over which it thins out at the hairline."""
+EDGE_LENGTH = 0.55
+"""Length of the hairs at its thin end, as a share of those on the scalp."""
 BROW_STROKES = ((1600, 0.0), (700, 0.25))
 """Of both brows: how many hairs, and how far their colour is towards that of the skin."""
 TAPER = ((1.0, 110), (0.7, 190), (0.4, 255))
@@ -99,12 +103,12 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     colour = _lines(colour, p, looks)
     colour = _eyes(colour, p, ring_eye, looks)
     colour = _mouth(colour, p, ring_mouth, lip_side, looks)
-    hair = scalp(p, 0.009)
+    hair = scalp(_ragged(p), SOFT_EDGE)
     speckle = 0.5 + 0.5 * noise(p, 0.0009, 31)
-    cover = smoothstep(hair * 1.25 - 0.55 * speckle * (1 - hair))
+    cover = smoothstep(hair * 1.45 - 0.45 - 0.55 * speckle * (1 - hair))
     parting = np.zeros(len(p)) if looks.hair.curly else in_parting(p)
     below = _blend(np.tile(looks.hair.colours[0], (len(p), 1)), np.array(looks.scalp), parting)
-    below = below * (0.86 + 0.28 * speckle[:, None])
+    below = below * ((0.86 + 0.28 * speckle) * (1 + 0.3 * _locks(p, looks.hair)))[:, None]
     colour = _blend(colour, below, 0.9 * cover)
     colour = _blend(colour, np.array(looks.brow), 0.22 * brow(p, looks.brow_height)[1])
     image = np.zeros((*chart.known.shape, 3))
@@ -138,17 +142,17 @@ def _complexion(p: Float64, looks: Looks) -> Float64:
     colour = _blend(colour, np.array(looks.neck), smoothstep((-0.095 - p[:, 1]) / 0.05) * 0.9)
     broad = 0.75 + 0.5 * noise(p, 0.011, 1)
     for centre, radius, share in (
-        ((40, -40, -4), 40, 0.55), ((0, -38, 33), 24, 0.45), ((14, -40, 14), 14, 0.35),
-        ((0, -104, 6), 26, 0.25),
-        ((84, -15, -98), 44, 0.5), ((0, 40, 12), 40, 0.10),
+        ((40, -37, -4), 44, 0.62), ((0, -38, 33), 22, 0.75), ((14, -40, 14), 14, 0.55),
+        ((0, -104, 6), 26, 0.45), ((24, -66, 8), 16, 0.30),
+        ((84, -15, -98), 44, 0.12), ((0, 40, 12), 40, 0.10),
     ):  # fmt: skip
         colour = _blend(colour, np.array(looks.blush), _spot(p, centre, radius) * share * broad)
-    colour += np.array([5, 3.2, 2.4]) * (noise(p, 0.018, 2) * 0.8 + noise(p, 0.007, 3) * 0.7)[:, None]
-    red = noise(p, 0.0042, 4)[:, None] * np.array([1.5, -2.4, -2.6])
-    fine = noise(p, 0.0011, 5)[:, None] * np.array([2.6, 2.6, 2.4])
+    colour += np.array([6, 4.6, 3.6]) * (noise(p, 0.018, 2) * 0.9 + noise(p, 0.007, 3) * 0.9)[:, None]
+    red = noise(p, 0.0042, 4)[:, None] * np.array([1.5, -4.0, -4.2])
+    fine = noise(p, 0.0011, 5)[:, None] * np.array([4.2, 4.2, 4.0])
     pores = np.clip(noise(p, 0.00065, 6) - 0.45, 0, 1)[:, None]
     nose = np.clip(_spot(p, (6, -34, 24), 26) + _spot(p, (28, -34, 6), 26) * 0.7, 0, 1)[:, None]
-    colour += red + fine - pores * (6 + 26 * nose) * np.array([0.8, 1.0, 1.0])
+    colour += red + fine - pores * (14 + 30 * nose) * np.array([0.8, 1.0, 1.0])
     freckle = smoothstep((noise(p, 0.0021, 7) - 0.62) / 0.2) * smoothstep((noise(p, 0.010, 8) + 0.2) / 0.8)
     return _blend(colour, np.array(looks.freckle), freckle * 0.30 * _spot(p, (24, -26, 8), 42))
 
@@ -194,7 +198,7 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     upper = _spot(p, (31, 8, 1), 17) * (y > -1)
     lower = _spot(p, (26, -10, 0), 15) * (y <= -1)
     inner = _spot(p, (17, 1, 2), 13)
-    colour = _blend(colour, np.array(looks.socket), upper * 0.42 + lower * 0.30 + inner * 0.25)
+    colour = _blend(colour, np.array(looks.socket), upper * 0.42 + lower * 0.46 + inner * 0.25)
     lid = near & (ring < 5.0)
     colour = _blend(
         colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.75, 0)
@@ -247,14 +251,20 @@ def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
     solid = chart.known & (area < 1e-6) & (area > 1e-12)
     rows, columns = np.nonzero(solid)
     p = chart.positions_at[rows, columns]
-    weight = area[rows, columns] * np.clip(scalp(p, 0.008) * 1.15 - 0.1, 0, 1)
+    dense = scalp(_ragged(p), SOFT_EDGE)
+    weight = area[rows, columns] * dense**1.5
     weight *= 1.0 if hair.curly else 1 - 0.9 * in_parting(p)
+    locks = _locks(p, hair)
     layers = []
-    for colour in hair.colours:
-        chosen = random.choice(len(p), STROKES // len(hair.colours), p=weight / weight.sum())
+    tones = np.mean(hair.colours, axis=1)
+    for colour, tone in zip(hair.colours, tones - tones.mean(), strict=True):
+        # Pale hairs lie upon the locks, dark ones between them.
+        here = weight * np.clip(1 + 1.2 * locks * np.sign(tone), 0.1, 2)
+        chosen = random.choice(len(p), STROKES // len(hair.colours), p=here / here.sum())
         way = random.normal(0, 1, (len(chosen), 3)) if hair.curly else combed(p[chosen])
         way = _unit(way) + random.normal(0, 0.0 if hair.curly else 0.12, way.shape)
-        direction = _unit(way) * random.uniform(*hair.stroke, (len(chosen), 1))
+        length = EDGE_LENGTH + (1 - EDGE_LENGTH) * dense[chosen, None]
+        direction = _unit(way) * random.uniform(*hair.stroke, (len(chosen), 1)) * length
         other, back = _across_the_seam(p, chosen, direction)
         drawn = np.concatenate([chosen, other]), np.concatenate([direction, back])
         layers.append((*drawn, colour, 0.75, ((1.0, 255),)))
@@ -281,6 +291,22 @@ def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
         blurred = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
         faded = blurred.point(lambda value, s=strength: int(value * s))
         picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in colour)), (0, 0), faded)
+
+
+def _ragged(p: Float64) -> Float64:
+    """Return points (N, 3) shifted up and down, so that a hairline found there is uneven."""
+    shift = 0.0045 * noise(p, 0.011, 51) + 0.0022 * noise(p, 0.0032, 52)
+    return p + shift[:, None] * (0.0, 1.0, 0.0)
+
+
+def _locks(p: Float64, hair: Hair) -> Float64:
+    """Return (N,) -1..1 how far locks of hair stand out: stripes the way in which the hair is combed."""
+    if hair.curly:
+        return noise(p, 0.006, 61)
+    over = smoothstep((p[:, 1] - 0.045) / 0.045)
+    across = noise(p * (0.18, 1.0, 1.0), 0.0045, 61) * 0.6 + noise(p * (0.12, 1.0, 1.0), 0.0022, 62) * 0.4
+    down = noise(p * (1.0, 0.15, 1.0), 0.0045, 63) * 0.6 + noise(p * (1.0, 0.12, 1.0), 0.0022, 64) * 0.4
+    return over * across + (1 - over) * down
 
 
 def _across_the_seam(p: Float64, chosen: Integer, direction: Float64) -> tuple[Integer, Float64]:

@@ -27,11 +27,11 @@ THINNING, IN_MIDDLE = 1.9, 0.22
 stretch that counts all along the lip."""
 LIP_HEIGHT = 0.2
 """Distance from the line of contact up to which the height counts, in ES0."""
-BULGE = (1.0, 0.40)
+BULGE = (0.62, 0.40)
 """How far the cheek comes out, and up, as shares of the way of a raised corner."""
-FOLD = -0.30
+FOLD = -0.20
 """The same of the fold beside it."""
-CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.215), ({"8.3": 0.62, "9.1": 0.38}, 0.09)
+CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.13)
 """Where they are: shares of feature points of the left side, and their breadth in ES0."""
 RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
 NEAR, REACH = 0.54, 0.78
