@@ -16,6 +16,8 @@ MIDDLE = np.array([0.0, 0.012, -0.085])
 """Point of the skull from which hair stands away."""
 TOP = (0.030, 0.085)
 """Heights between which the hair reaches the thickness of the top, metres."""
+CALM = (0.080, 0.098)
+"""Heights of the skin between which locks cease to stand out, metres."""
 PARTING = 0.030
 """x of the parting, on the subject's left, metres."""
 GROOVE = 0.0021
@@ -29,7 +31,9 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
     folded = vertices * np.where(vertices[:, :1] < 0, (-1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
     above = height_above_hairline(folded)
     full = hair.sides + hair.top * smoothstep((folded[:, 1] - TOP[0]) / (TOP[1] - TOP[0]))
-    full = full + hair.lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
+    # Not on the crown, whose highest point is a feature point.
+    lumps = hair.lumps * (1 - smoothstep((folded[:, 1] - CALM[0]) / (CALM[1] - CALM[0])))
+    full = full + lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
     # Locks end in a rounded edge, not in a ramp.
     share = np.sqrt(np.clip(above / hair.rise, 0.0, 1.0)) * smoothstep(above / 0.004)
     away = vertices - MIDDLE
