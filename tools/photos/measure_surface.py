@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,8 @@ from scipy.spatial import cKDTree
 from fba.arrays import Bool, Float64, Intp
 from fba.errors import FbaWarning
 from fba.face import FaceModel
-from fba.face.fitting import FRONT_POINTS, SIDE_POINTS, Photo, Photograph, PhotoHead, head_from_photos
+from fba.face.fitting import FRONT_POINTS, SIDE_POINTS, Photo, Photograph
+from fba.face.fitting._head import fit_head
 from fba.face.fitting._views import View
 from fba.face.importers import import_model
 from fba.geometry import fit_similarity
@@ -72,7 +73,7 @@ class SurfaceError:
         return float(np.average(np.abs(self.errors) < 0.003, weights=self.samples[2]))
 
 
-def photographed(head: FaceModel, number: int, *, side: bool) -> PhotoHead:
+def photographed(head: FaceModel, number: int, *, side: bool) -> FaceModel:
     """Return the head made of true points of a head, seen from up to 10 degrees off the front and side."""
     random = np.random.default_rng(number)
     row = point_rows()
@@ -89,7 +90,8 @@ def photographed(head: FaceModel, number: int, *, side: bool) -> PhotoHead:
         photos.append(Photo(Photograph(pixels, SIZE, f"{yaw:g}"), points))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)
-        return head_from_photos(photos[0], photos[1] if side else None, eyes=eyes)
+        base = replace(FaceModel.default(), tables=(), levels=())  # only the shape is measured
+        return fit_head(base, photos[0], photos[1] if side else None, eyes=eyes)[0]
 
 
 def surface_error(fitted: FaceModel, true: FaceModel) -> SurfaceError:
@@ -189,7 +191,7 @@ def main(shared: str, output: str | None = None) -> None:
     maps = []
     print(f"{'':20}   front alone: mean, 95 % (mm), within 3 mm    with profile")
     for number, (name, head) in enumerate(heads.items()):
-        errors = [surface_error(photographed(head, number, side=side).model, head) for side in (False, True)]
+        errors = [surface_error(photographed(head, number, side=side), head) for side in (False, True)]
         texts = [f"{one.mean:6.2f} {one.most:6.2f} {100 * one.good:6.0f} %" for one in errors]
         print(f"{name:20} {'      '.join(texts)}", flush=True)
         points = head.points[given(head)]

@@ -83,6 +83,28 @@ def head_from_photos(
     from fba.face.builtin import default
 
     base = default()
+    model, views, seen = fit_head(base, front, side, eyes=eyes, distance=distance, name=name)
+    photographs = [one.photograph for one in (front, side) if one is not None]
+    errors = tuple(_errors(model, view, one) for view, one in zip(views, seen, strict=True))
+    _warn_of_errors(["front", "side"][: len(views)], errors)
+    model, share = paint(model, photographs, views, hair=hair)
+    made = "frontal photograph and profile" if side is not None else "frontal photograph"
+    model = model.with_notes({"skin": f"from a {made}"})
+    return PhotoHead(model, tuple(views), errors, measure(model, base), share)
+
+
+def fit_head(
+    base: FaceModel,
+    front: Photo,
+    side: Photo | None = None,
+    *,
+    eyes: float | None = None,
+    distance: float = DISTANCE,
+    name: str = "",
+) -> tuple[FaceModel, list[View], list[Observation]]:
+    """Return (a head fitted to photographs, their views, what they show), as `head_from_photos` before it
+    paints the skin. base: the head that is fitted.
+    """
     if eyes is not None and not EYE_DISTANCES[0] <= eyes <= EYE_DISTANCES[1]:
         raise ModelError(
             f"pupils {eyes * 1000:g} mm apart are not those of a person: {EYE_DISTANCES[0] * 1000:g} to "
@@ -108,12 +130,7 @@ def head_from_photos(
     points *= (usual if eyes is None else eyes) / apart
     model = fit(base, points, unit="m", name=name)
     views = fit_views(model.points, views, seen)
-    errors = tuple(_errors(model, view, one) for view, one in zip(views, seen, strict=True))
-    _warn_of_errors([view for view, _ in photos], errors)
-    model, share = paint(model, [photo.photograph for _, photo in photos], views, hair=hair)
-    made = "frontal photograph and profile" if side is not None else "frontal photograph"
-    model = model.with_notes({"skin": f"from a {made}"})
-    return PhotoHead(model, tuple(views), errors, measure(model, base), share)
+    return model, views, seen
 
 
 def template_points(photograph: Photograph, view: str) -> dict[str, tuple[float, float]]:

@@ -10,21 +10,32 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from fba.errors import FbaWarning, ModelError
+from fba.face import FaceModel
 from fba.face.fitting import FRONT_POINTS, Photograph, find_front_points
 from tools.photos.measure_points import errors, group_errors
+from tools.photos.measure_surface import photographed, surface_error
 from tools.photos.other_heads import Picture, other_heads, pictures
 
 BOUNDS = {"all": 5.0, "pupils": 3.0}
 """Largest mean errors, in % of the distance between the pupils; docs/photos.md has those of more pictures."""
+SURFACE = {"rpm646d": (1.3, 3.1), "MakeHuman": (2.3, 5.7)}
+"""Largest errors of the surface between the points, mm: mean, and that of 95 % of the face; as measured, and
+some more."""
 NO_FACES = ("coffee", "coins", "chelsea", "rocket", "page", "brick")
 
 
 @pytest.fixture(scope="module")
-def shown(shared: Path, opengl: None) -> list[Picture]:
-    """A small picture of each of a few heads that are no variation of the built-in one."""
-    heads = other_heads(shared, ("rpm646d", "MakeHuman"))
+def heads(shared: Path) -> dict[str, FaceModel]:
+    """A few heads that are no variation of the built-in one."""
+    heads = other_heads(shared, SURFACE)
     if not heads:
         pytest.skip("no heads in the shared folder")
+    return heads
+
+
+@pytest.fixture(scope="module")
+def shown(heads: dict[str, FaceModel], opengl: None) -> list[Picture]:
+    """A small picture of each head."""
     return [
         one for k, (name, head) in enumerate(heads.items())
         for one in pictures(name, head, k + 1, (250, 300), 1)
@@ -35,6 +46,14 @@ def shown(shared: Path, opengl: None) -> list[Picture]:
 def test_points_are_found_on_other_heads(shown: list[Picture]) -> None:
     off = group_errors(np.array([errors(find_front_points(one.photograph), one) for one in shown]))
     assert {name: off[name] for name in BOUNDS if off[name] > BOUNDS[name]} == {}
+
+
+def test_the_surface_between_the_points_is_that_of_other_heads(heads: dict[str, FaceModel]) -> None:
+    for number, (name, head) in enumerate(heads.items(), 2):
+        error = surface_error(photographed(head, number, side=True), head)
+        mean, most = SURFACE[name]
+        assert error.mean < mean
+        assert error.most < most
 
 
 @pytest.mark.filterwarnings("ignore::fba.errors.FbaWarning")
