@@ -1,7 +1,8 @@
 """What a smile does beside moving the corners of the mouth: FAPs 6, 7, 12, 13 and 53, 54, 59, 60.
 
-Corners that are drawn apart slide back round the teeth, and the lips between grow thin. Corners that are
-raised push the cheek up into a bulge below the eye, beside which the fold from nose to mouth deepens.
+Corners that are drawn apart slide back round the teeth. Lips do not grow thin: their contours have FAPs of
+their own, and captures would find those moved. Corners that are raised push the cheek up into a bulge below
+the eye, beside which the fold from nose to mouth deepens.
 """
 
 from __future__ import annotations
@@ -22,11 +23,6 @@ STRAIGHT = 100.0
 """Value up to which a stretched corner goes straight to the side; then it meets the teeth."""
 BEND = 0.62
 """From there on, its way back as a share of its way to the side."""
-THINNING, IN_MIDDLE = 1.9, 0.22
-"""Share of a lip's height that goes where it is stretched by the mouth's width; and the share of the corner's
-stretch that counts all along the lip."""
-LIP_HEIGHT = 0.2
-"""Distance from the line of contact up to which the height counts, in ES0."""
 BULGE = (0.62, 0.40)
 """How far the cheek comes out, and up, as shares of the way of a raised corner."""
 FOLD = -0.20
@@ -43,7 +39,7 @@ FOLD_OUTWARD = 0.09
 def add_smile(marks: Landmarks, limiter: Limiter, fap: int, motion: Motion) -> Motion:
     """Return the motion of the corner of the mouth by a FAP with what goes along; others as they are."""
     if fap in STRETCHING:
-        return stop_at_folds(limiter, _stretched(marks, _with_knot(motion)))
+        return stop_at_folds(limiter, _stretched(_with_knot(motion)))
     if fap in RAISING:
         return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], outer=fap > 50))
     return motion
@@ -55,23 +51,11 @@ def _with_knot(motion: Motion) -> Motion:
     return Motion(values, motion.vertices, np.stack([motion.shifts_at(value) for value in values]))
 
 
-def _stretched(marks: Landmarks, motion: Motion) -> Motion:
-    """Return a stretch that bends round the teeth, of lips that grow thinner."""
-    surface, es = marks.surface, marks.fapu.ES * 1024
-    near = surface.distances(np.flatnonzero(marks.lips | marks.on_inner_lips), 0.2 * es)
-    motion = _including(motion, np.flatnonzero((near < 0.2 * es) & ~marks.inside_mouth))
-    places = surface.vertices[motion.vertices]
-    on_lip = np.exp(-((np.minimum(near[motion.vertices], es) / (0.08 * es)) ** 2))
-    middle, corner = marks.point_or_average("2.2"), marks.point_or_average("8.3")
-    sideways = np.clip((places[:, 0] - middle[0]) / (corner[0] - middle[0]), -1.0, 1.0) ** 2
-    line = middle[1] + (corner[1] - middle[1]) * sideways
-    height = np.clip(places[:, 1] - line, -LIP_HEIGHT * es, LIP_HEIGHT * es)
-    width = marks.fapu.MW * 1024
+def _stretched(motion: Motion) -> Motion:
+    """Return a stretch that bends round the teeth."""
     shifts = motion.shifts.copy()
     apart = np.abs(motion.shifts[..., 0]) * (motion.values > 0)[:, None]
     shifts[..., 2] -= BEND * np.maximum(apart - np.abs(motion.shifts_at(STRAIGHT)[:, 0]), 0.0)
-    thin = apart + IN_MIDDLE * np.maximum(_ways(motion.values, 6) * marks.fapu.MW, 0.0)[:, None]
-    shifts[..., 1] -= thin / width * THINNING * height * on_lip
     return Motion(motion.values, motion.vertices, shifts)
 
 
