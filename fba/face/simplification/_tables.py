@@ -230,7 +230,7 @@ class _Easing:
         """Return the motion with folds stretched evenly, where need be even where it should not change."""
         outside = self._outside(fap)
         for pinned in (self._fit.fixed, self._own_points(fap)):
-            eased = unfold(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
+            eased = _unfold_each(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
             if _is_sound(limiter, _moving(eased), fap in TURNING):
                 break
         return eased
@@ -267,7 +267,9 @@ class _Easing:
                 if _is_sound(limiter, _moving(motion), True):
                     break
                 motion = self._unfold(surface, limiter, motion, fap)
-        motion = stop_at_folds(limiter, _moving(motion), turning=True)
+        motion = _moving(motion)
+        if not _is_sound(limiter, motion, True):
+            motion = stop_at_folds(limiter, motion, turning=True)
         return _go_on(motion, borders, moves, unit)
 
     @cached_property
@@ -303,10 +305,26 @@ def _go_on(motion: Motion, borders: Int32, moves: Float64, unit: float) -> Motio
     return Motion(values, motion.vertices, np.array(shifts))
 
 
+def _unfold_each(
+    surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool
+) -> Motion:
+    """Return the motion unfolded value by value: in each, what moves then is judged, as by the checks."""
+    shifts = np.zeros((len(motion.values), len(surface), 3))
+    for k, shift in enumerate(motion.shifts):
+        moved = shift.any(axis=1)
+        step = np.stack([0 * shift[moved], shift[moved]])
+        alone = Motion(np.array([0.0, 1.0]), motion.vertices[moved], step)
+        alone = unfold(surface, limiter, alone, pinned, turning)
+        shifts[k, alone.vertices] = alone.shifts[1]
+    vertices = np.flatnonzero(shifts.any(axis=(0, 2)))
+    return Motion(motion.values, vertices, shifts[:, vertices])
+
+
 def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:
-    patch = limiter.patch(motion.vertices)
+    """Return whether each shift folds nothing, among the triangles that move in it, as the checks count."""
     return all(
-        patch.is_sound(limiter.spread(motion.vertices, shift), turning=turning) for shift in motion.shifts
+        limiter.patch(np.flatnonzero(shift.any(axis=1))).is_sound(shift, turning=turning)
+        for shift in (limiter.spread(motion.vertices, step) for step in motion.shifts)
     )
 
 
