@@ -28,7 +28,14 @@ from fba.face.authoring.surface._motion import (
 from fba.face.authoring.surface._motion_limits import stop_at_folds
 from fba.face.authoring.surface.landmarks import CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
-from fba.face.checks._fap_checks import CORNER_RADIUS, EYE_CORNERS, HAIR, TURNING, region_table
+from fba.face.checks._fap_checks import (
+    CORNER_RADIUS,
+    EYE_CORNERS,
+    HAIR,
+    MAX_TURNED_SHARE,
+    TURNING,
+    region_table,
+)
 from fba.face.model import FaceModel, Part
 from fba.mesh.simplify import Level, part_starts, place_on_level
 from fba.parameters import faps, point_rows
@@ -258,15 +265,14 @@ class _Easing:
         side = LIDS[fap][0]
         eye = find_eyes(self._marks, self._face.parts)[side]
         limiter = limiter.without(self._corners(side))
-        motion = self._unfold(surface, limiter, self._motion(fap, borders, moves, unit), fap)
-        if eye.measured and not eye.flat:
-            profile = measure_profile(eye, self._face.parts, 0.0)
-            pinned = surface.mask(self._on_lines) | self._outside(fap)
-            for _ in range(ROUNDS):
-                motion = lift_off(profile, surface, motion, pinned)
-                if _is_sound(limiter, _moving(motion), True):
-                    break
-                motion = self._unfold(surface, limiter, motion, fap)
+        motion = self._motion(fap, borders, moves, unit)
+        pinned = surface.mask(self._on_lines) | self._outside(fap)
+        for _ in range(ROUNDS):
+            motion = self._unfold(surface, limiter, motion, fap)
+            if eye.measured and not eye.flat:
+                motion = lift_off(measure_profile(eye, self._face.parts, 0.0), surface, motion, pinned)
+            if _is_sound(limiter, _moving(motion), True):
+                break
         motion = _moving(motion)
         if not _is_sound(limiter, motion, True):
             motion = stop_at_folds(limiter, motion, turning=True)
@@ -305,9 +311,7 @@ def _go_on(motion: Motion, borders: Int32, moves: Float64, unit: float) -> Motio
     return Motion(values, motion.vertices, np.array(shifts))
 
 
-def _unfold_each(
-    surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool
-) -> Motion:
+def _unfold_each(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:
     """Return the motion unfolded value by value: in each, what moves then is judged, as by the checks."""
     shifts = np.zeros((len(motion.values), len(surface), 3))
     for k, shift in enumerate(motion.shifts):
@@ -321,11 +325,14 @@ def _unfold_each(
 
 
 def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:
-    """Return whether each shift folds nothing, among the triangles that move in it, as the checks count."""
-    return all(
-        limiter.patch(np.flatnonzero(shift.any(axis=1))).is_sound(shift, turning=turning)
-        for shift in (limiter.spread(motion.vertices, step) for step in motion.shifts)
-    )
+    """Return whether no shift folds more, of what moves in it, than the checks allow."""
+    for step in motion.shifts:
+        shift = limiter.spread(motion.vertices, step)
+        patch = limiter.patch(np.flatnonzero(shift.any(axis=1)))
+        folded = patch.areas[~patch.soundness(shift, turning=turning)].sum()
+        if folded > (MAX_TURNED_SHARE if turning else 0.0) * patch.areas.sum():
+            return False
+    return True
 
 
 def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -> Motion:
