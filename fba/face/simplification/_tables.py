@@ -28,6 +28,7 @@ from fba.face.authoring.surface._motion import (
 from fba.face.authoring.surface._motion_limits import stop_at_folds
 from fba.face.authoring.surface.landmarks import CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
+from fba.face.checks._combined_rules import CLOSED, SIDES, SPLITS
 from fba.face.checks._fap_checks import (
     CORNER_RADIUS,
     EYE_CORNERS,
@@ -36,6 +37,7 @@ from fba.face.checks._fap_checks import (
     TURNING,
     region_table,
 )
+from fba.face.checks._posing import Poser
 from fba.face.model import FaceModel, Part
 from fba.mesh.simplify import Level, part_starts, place_on_level
 from fba.parameters import faps, point_rows
@@ -113,6 +115,45 @@ def fit_tables(
         ]
         tables.append(replace(table, meshes=tuple(mesh for mesh in meshes if mesh is not None)))
     return tuple(tables)
+
+
+def close_lids(face: FaceModel) -> tuple[FaceDefTables, ...]:
+    """Return the tables of a face, those of upper lids with margins that end on those of the lower lids.
+
+    Their other vertices stay as they are: this is for gaps of a few percent of the iris.
+    """
+    poser, tables = Poser(face), dict(face.table_of)
+    surface, values = poser.marks.surface, np.array([0, *sorted(SPLITS)])
+    place = np.full(len(face.vertices), len(surface))  # of what is no skin
+    place[surface.pool] = surface.number
+    for side, (upper, lower) in SIDES.items():
+        if not {upper, lower} <= tables.keys():
+            continue
+        margin = poser.marks.contour(f"{side} upper lid")
+        ways = np.zeros((len(values), len(surface) + 1, 3))
+        for way, split in zip(ways[1:], values[1:], strict=True):
+            moved = poser.pose({upper: split, lower: CLOSED - split})
+            line, other = (poser.contour(f"{side} {lid} lid", moved) for lid in ("upper", "lower"))
+            other = other[np.argsort(other[:, 0], kind="stable")]
+            for axis in (1, 2):
+                way[margin, axis] = np.interp(line[:, 0], other[:, 0], other[:, axis]) - line[:, axis]
+        ways /= face.fapu.of_fap(upper)
+        meshes = (
+            _add_shifts(mesh, values, ways[:, place[mesh.vertices + face.starts[mesh.part]]])
+            for mesh in tables[upper].meshes
+        )
+        tables[upper] = replace(tables[upper], meshes=tuple(meshes))
+    return tuple(tables.values())
+
+
+def _add_shifts(mesh: FaceDefMesh, values: Intp, shifts: Float64) -> FaceDefMesh:
+    """Return the mesh of a table with shifts (K, N, 3), in FAPU, added at values (K,), and evenly between."""
+    borders = np.union1d(mesh.borders, values)
+    interval = np.searchsorted(mesh.borders, borders[:-1], side="right") - 1
+    shares = [np.interp(borders, values, row) for row in np.eye(len(values))]
+    more = np.einsum("kb,knd->nbd", np.diff(shares) / np.diff(borders), shifts)
+    moves = mesh.displacements[:, np.clip(interval, 0, len(mesh.borders) - 2)] + more
+    return FaceDefMesh(mesh.part, borders.astype(np.int32), mesh.vertices, moves.astype(np.float32))
 
 
 class _Fit:
