@@ -22,7 +22,7 @@ from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
 from fba.face.importers.assembly._repair import repair_tables, take_sounder
 from fba.face.model import DetailLevel, FaceModel, shape_key
-from fba.face.simplification._tables import find_balls, find_lines, fit_tables
+from fba.face.simplification._tables import close_lids, find_balls, find_lines, fit_tables
 from fba.mesh.simplify import (
     Level,
     Simplification,
@@ -35,7 +35,7 @@ from fba.parameters import FAP_COUNT
 
 POSES: tuple[dict[int, int], ...] = (
     {},
-    {3: 1000},
+    {3: 1000, 19: 768, 20: 768, 21: 256, 22: 256},
     {19: 1024, 20: 1024, 31: 300, 32: 300, 35: 200, 36: 200, 12: 300, 13: 300, 59: 300, 60: 300, 6: 200,
      7: 200, 53: 200, 54: 200},
     {4: 300, 8: 300, 9: 300, 5: -300, 10: -300, 11: -300, 6: -200, 7: -200, 53: -200, 54: -200, 19: -300,
@@ -129,7 +129,8 @@ class FaceSimplification:
         )
 
     def _mend(self, face: FaceModel, level: Level) -> FaceModel:
-        """Return the face with other tables for FAPs whose own break rules: carried, or from the mesh."""
+        """Return the face with other tables for FAPs whose own break rules: with lids that meet, carried, or
+        from the mesh."""
         poser, faps = Poser(face), [table.fap for table in face.tables]
         if not count_errors(poser, faps):
             return face
@@ -138,8 +139,8 @@ class FaceSimplification:
         model, still = self.model.with_tables(lids, {}), self._unmoved(level)
         carried = fit_tables(model, bare, level, still, self.mesh.positions, carried=True)
         plain = author(face.parts, face.points, bound=face.bound)
-        for other in (bare.with_tables(carried, {}), bare.with_tables(plain.tables, {})):
-            face = take_sounder(face, other)
+        for tables in (close_lids(face), carried, plain.tables):
+            face = take_sounder(face, bare.with_tables(tables, {}))
         return repair_tables(face, plain)
 
     @cached_property

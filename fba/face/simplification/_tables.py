@@ -28,7 +28,16 @@ from fba.face.authoring.surface._motion import (
 from fba.face.authoring.surface._motion_limits import stop_at_folds
 from fba.face.authoring.surface.landmarks import CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
-from fba.face.checks._fap_checks import CORNER_RADIUS, EYE_CORNERS, HAIR, TURNING, region_table
+from fba.face.checks._combined_rules import CLOSED, SIDES, SPLITS
+from fba.face.checks._fap_checks import (
+    CORNER_RADIUS,
+    EYE_CORNERS,
+    HAIR,
+    MAX_TURNED_SHARE,
+    TURNING,
+    region_table,
+)
+from fba.face.checks._posing import Poser
 from fba.face.model import FaceModel, Part
 from fba.mesh.simplify import Level, part_starts, place_on_level
 from fba.parameters import faps, point_rows
@@ -106,6 +115,45 @@ def fit_tables(
         ]
         tables.append(replace(table, meshes=tuple(mesh for mesh in meshes if mesh is not None)))
     return tuple(tables)
+
+
+def close_lids(face: FaceModel) -> tuple[FaceDefTables, ...]:
+    """Return the tables of a face, those of upper lids with margins that end on those of the lower lids.
+
+    Their other vertices stay as they are: this is for gaps of a few percent of the iris.
+    """
+    poser, tables = Poser(face), dict(face.table_of)
+    surface, values = poser.marks.surface, np.array([0, *sorted(SPLITS)])
+    place = np.full(len(face.vertices), len(surface))  # of what is no skin
+    place[surface.pool] = surface.number
+    for side, (upper, lower) in SIDES.items():
+        if not {upper, lower} <= tables.keys():
+            continue
+        margin = poser.marks.contour(f"{side} upper lid")
+        ways = np.zeros((len(values), len(surface) + 1, 3))
+        for way, split in zip(ways[1:], values[1:], strict=True):
+            moved = poser.pose({upper: split, lower: CLOSED - split})
+            line, other = (poser.contour(f"{side} {lid} lid", moved) for lid in ("upper", "lower"))
+            other = other[np.argsort(other[:, 0], kind="stable")]
+            for axis in (1, 2):
+                way[margin, axis] = np.interp(line[:, 0], other[:, 0], other[:, axis]) - line[:, axis]
+        ways /= face.fapu.of_fap(upper)
+        meshes = (
+            _add_shifts(mesh, values, ways[:, place[mesh.vertices + face.starts[mesh.part]]])
+            for mesh in tables[upper].meshes
+        )
+        tables[upper] = replace(tables[upper], meshes=tuple(meshes))
+    return tuple(tables.values())
+
+
+def _add_shifts(mesh: FaceDefMesh, values: Intp, shifts: Float64) -> FaceDefMesh:
+    """Return the mesh of a table with shifts (K, N, 3), in FAPU, added at values (K,), and evenly between."""
+    borders = np.union1d(mesh.borders, values)
+    interval = np.searchsorted(mesh.borders, borders[:-1], side="right") - 1
+    shares = [np.interp(borders, values, row) for row in np.eye(len(values))]
+    more = np.einsum("kb,knd->nbd", np.diff(shares) / np.diff(borders), shifts)
+    moves = mesh.displacements[:, np.clip(interval, 0, len(mesh.borders) - 2)] + more
+    return FaceDefMesh(mesh.part, borders.astype(np.int32), mesh.vertices, moves.astype(np.float32))
 
 
 class _Fit:
@@ -230,7 +278,7 @@ class _Easing:
         """Return the motion with folds stretched evenly, where need be even where it should not change."""
         outside = self._outside(fap)
         for pinned in (self._fit.fixed, self._own_points(fap)):
-            eased = unfold(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
+            eased = _unfold_each(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
             if _is_sound(limiter, _moving(eased), fap in TURNING):
                 break
         return eased
@@ -258,16 +306,17 @@ class _Easing:
         side = LIDS[fap][0]
         eye = find_eyes(self._marks, self._face.parts)[side]
         limiter = limiter.without(self._corners(side))
-        motion = self._unfold(surface, limiter, self._motion(fap, borders, moves, unit), fap)
-        if eye.measured and not eye.flat:
-            profile = measure_profile(eye, self._face.parts, 0.0)
-            pinned = surface.mask(self._on_lines) | self._outside(fap)
-            for _ in range(ROUNDS):
-                motion = lift_off(profile, surface, motion, pinned)
-                if _is_sound(limiter, _moving(motion), True):
-                    break
-                motion = self._unfold(surface, limiter, motion, fap)
-        motion = stop_at_folds(limiter, _moving(motion), turning=True)
+        motion = self._motion(fap, borders, moves, unit)
+        pinned = surface.mask(self._on_lines) | self._outside(fap)
+        for _ in range(ROUNDS):
+            motion = self._unfold(surface, limiter, motion, fap)
+            if eye.measured and not eye.flat:
+                motion = lift_off(measure_profile(eye, self._face.parts, 0.0), surface, motion, pinned)
+            if _is_sound(limiter, _moving(motion), True):
+                break
+        motion = _moving(motion)
+        if not _is_sound(limiter, motion, True):
+            motion = stop_at_folds(limiter, motion, turning=True)
         return _go_on(motion, borders, moves, unit)
 
     @cached_property
@@ -303,11 +352,28 @@ def _go_on(motion: Motion, borders: Int32, moves: Float64, unit: float) -> Motio
     return Motion(values, motion.vertices, np.array(shifts))
 
 
+def _unfold_each(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:
+    """Return the motion unfolded value by value: in each, what moves then is judged, as by the checks."""
+    shifts = np.zeros((len(motion.values), len(surface), 3))
+    for k, shift in enumerate(motion.shifts):
+        moved = shift.any(axis=1)
+        step = np.stack([0 * shift[moved], shift[moved]])
+        alone = Motion(np.array([0.0, 1.0]), motion.vertices[moved], step)
+        alone = unfold(surface, limiter, alone, pinned, turning)
+        shifts[k, alone.vertices] = alone.shifts[1]
+    vertices = np.flatnonzero(shifts.any(axis=(0, 2)))
+    return Motion(motion.values, vertices, shifts[:, vertices])
+
+
 def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:
-    patch = limiter.patch(motion.vertices)
-    return all(
-        patch.is_sound(limiter.spread(motion.vertices, shift), turning=turning) for shift in motion.shifts
-    )
+    """Return whether no shift folds more, of what moves in it, than the checks allow."""
+    for step in motion.shifts:
+        shift = limiter.spread(motion.vertices, step)
+        patch = limiter.patch(np.flatnonzero(shift.any(axis=1)))
+        folded = patch.areas[~patch.soundness(shift, turning=turning)].sum()
+        if folded > (MAX_TURNED_SHARE if turning else 0.0) * patch.areas.sum():
+            return False
+    return True
 
 
 def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -> Motion:
