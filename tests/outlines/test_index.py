@@ -39,8 +39,9 @@ def pictured(figure: Figure, frame: int, view: View) -> np.ndarray:
 def test_every_silhouette_finds_itself(index: Index) -> None:
     assert len(index) == (6 + 4) * 8
     for number in range(0, len(index), 7):
-        hit = index.search(index.silhouette(number), 1)[0]
-        assert (hit.number, hit.distance) == (number, pytest.approx(0, abs=1e-6))
+        hits = index.search(index.silhouette(number), 2)
+        hit = next(hit for hit in hits if hit.number == number)  # what a body hides, another frame may have
+        assert hit.distance == hits[0].distance == pytest.approx(0, abs=1e-6)
         assert hit.stream == ("raising" if number < 48 else "nodding")
         assert hit.frame == (number // 8 if number < 48 else number // 8 - 6)
         assert hit.seconds == (hit.frame * 2 / 5 if number < 48 else hit.frame / 25)

@@ -16,7 +16,7 @@ from fba_player.view._view import FaceMesh
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba faces are drawn as they are")
 PIXEL = 0.0006
-NEAR, MIDDLE, FAR = ((0.0, 0.0, away) for away in (0.4, 1.1, 8.0))
+NEAR, MIDDLE, FAR = ((0.0, 0.0, away) for away in (0.4, 1.2, 8.0))
 
 
 @pytest.fixture(scope="module")

@@ -182,7 +182,7 @@ def test_lanes_show_what_has_been_said_so_far(wire: Wire) -> None:
     wire.send(data[ends[2] + 2 :])
     wire.end()
     assert live.wait_end()
-    assert [[lane.text(time) for time in (0.05, 0.15, 0.17)] for lane in source.lanes] == [
+    assert [[lane.text(time) for time in (0.05, 0.13, 0.17)] for lane in source.lanes] == [
         ["A: 100%", "A: 100%", "p b m 100%"]
     ]
 

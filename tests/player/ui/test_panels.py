@@ -15,6 +15,7 @@ from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
 from fba_player.session._session import Session
 from fba_player.session._source import Source
+from fba_player.view.switches import Quality
 from set_clock import Clock
 
 imgui = graphics.imported("imgui_bundle").imgui
@@ -200,7 +201,8 @@ def test_bare_shows_the_picture_alone(studio: Studio) -> None:
     session.bare = True
     from fba_player.export._offscreen import Offscreen
 
-    with Offscreen(session.scene, SIZE, session.viewpoint.camera) as plain:
+    samples = Quality.FAST.samples  # as in a window without a graphics card
+    with Offscreen(session.scene, SIZE, session.viewpoint.camera, samples=samples) as plain:
         wanted = plain.frame(0.0)
     np.testing.assert_array_equal(studio.draw(3)[..., :3], wanted[..., :3])
 
