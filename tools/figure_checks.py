@@ -62,10 +62,10 @@ STEPS = 9
 """Values tried of each FAP."""
 REACH = {2: 400, 3: 10**6, 4: 1080, 5: 400, 6: 1080, 7: 10**6, 8: 400, 9: 1080, 10: 1080}
 """Largest value tried of a FAP, by group: as far as faces go."""
-HAND_DEPTH, THIGH_REACH = 0.002, 0.1
+HAND_DEPTH, THIGH_REACH = 0.001, 0.1
 """Depth in a thigh that counts, and the distance from its skin within which it is known, metres."""
 
-HAND_FRAMES = 60
+HAND_FRAMES = 200
 """Frames of a body that are looked at, at most."""
 Named = list[tuple[str, Float32]]
 """Resolved FAPs (68,), each with a name."""

@@ -43,9 +43,9 @@ POSES: tuple[dict[int, int], ...] = (
     {16: 500, 17: 500, 6: -150, 7: -150, 4: 200, 5: 200, 41: 200, 42: 200, 3: 300, 19: 424, 20: 424, 21: 600,
      22: 600},
 )  # fmt: skip
-"""FAP values of the poses in which the face is simplified: at rest, the jaw open, the lids closed with a
-broad grin, the lips apart with wide eyes, and the lips pushed forward with raised cheeks and lids that meet
-half way."""
+"""FAP values of the poses in which the face is simplified: at rest, the jaw open with lids that meet low, the
+lids closed with a broad grin, the lips apart with wide eyes, and the lips pushed forward with raised cheeks
+and lids that meet half way."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
 IMPORTANCE = 100.0

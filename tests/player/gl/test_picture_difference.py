@@ -82,7 +82,7 @@ class TestOfPictures:
             ("fap_eyes", {"faps": ("yaw_l_eyeball=25000", "yaw_r_eyeball=15000")}),
             ("viseme_10", {"visemes": ("9",)}),
             ("expression_joy", {"expressions": ("sadness=63",)}),
-            ("body_standing", {"baps": ("l_elbow_flexion=20000",)}),
+            ("body_standing", {"baps": ("r_elbow_flexion=15000",)}),
             ("switch_influence", {"switches": ("influence=18",)}),
             ("points_face", {"faps": ()}),
         ],
