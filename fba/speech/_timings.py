@@ -109,10 +109,12 @@ def find_timings(motion: Animation) -> Speech:
 
     A mouth is bent towards the sounds around, so that most are not the ones that were meant.
 
-    Raises FormatError for an animation without a face.
+    Raises FormatError for an animation without a face or without frames.
     """
     if motion.face is None:
         raise FormatError("the motion is that of a body, not of a face")
+    if not len(motion):
+        raise FormatError("the motion has no frames")
     table = Definitions.default().visemes
     alike, squares = motion.face.values @ table.T, np.square(table).sum(axis=1)
     nearest = np.argmin(np.min([size**2 * squares - 2 * size * alike for size in SIZES], axis=0), axis=1)

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fba
 from fba.errors import FormatError
-from fba.speech import find_shapes, format_visemes, read_timings
+from fba.speech import find_shapes, find_timings, format_visemes, read_timings
 
 LONG_TEXTGRID = """File type = "ooTextFile"
 Object class = "TextGrid"
@@ -260,6 +261,12 @@ def test_bytes_are_no_timings(tmp_path: Path) -> None:
     path.write_bytes(b"RIFF\xff\xfe\x80\x81")
     with pytest.raises(FormatError, match="is no text in UTF-8 or UTF-16"):
         read_timings(path)
+
+
+def test_no_frames_have_no_timings() -> None:
+    motion = fba.read(Path(fba.__file__).parent / "samples" / "hello.fap")
+    with pytest.raises(FormatError, match="no frames"):
+        find_timings(motion[:0])
 
 
 WRITERS = {
