@@ -60,7 +60,6 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Mo
         modules = []
         for one in (helper, name):
             spec = importlib.util.spec_from_file_location(one, tmp_path / f"{one}.py")
-            assert spec is not None
             assert spec.loader is not None
             modules.append(importlib.util.module_from_spec(spec))
             monkeypatch.setitem(sys.modules, one, modules[-1])

@@ -83,7 +83,6 @@ def test_script_runs_as_it_is(script: str, shell: str) -> None:
 def test_ci_leaves_to_the_coverage_what_that_runs() -> None:
     """On the oldest Python, each test runs in one stage, but for long ones and those of the documentation."""
     rooms = re.search(r"rooms='([^']*)'", (ROOT / "dev").read_text(encoding="utf-8"))
-    assert rooms is not None
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     left_out = re.findall(r"--ignore=tests/([^\s)]+)", script)
     assert left_out == [*rooms[1].split(), "player/web"]  # ./dev web runs the last

@@ -142,7 +142,6 @@ def test_on_tiptoe_the_tip_of_the_toes_is_lowest() -> None:
     joints = ("ankle", "subtalar", "midtarsal", "metatarsal")
     root = skeleton.centres[:1]
     found = soles.body_soles(skeleton, {f"l_{joint}": down for joint in joints}, root)
-    assert found is not None
     ankle, ball = (skeleton.centres[skeleton.number(name)] for name in ("l_ankle", "l_metatarsal"))
     assert found.lowest[0] == pytest.approx(ankle[1] - (ball[2] - ankle[2]) - 0.0745)
     assert found.points[1, 0, 0] == pytest.approx(  # the right heel, flat on the ground

@@ -303,7 +303,6 @@ others are of a straight leg behind, whose foot is about to leave, or has just c
 
 def standing_soles(captured: SkeletonMotion, mapped: dict[str, int], animation: Animation) -> np.ndarray:
     """Heights in metres of the shown person's soles, of each foot while the source's stands."""
-    assert animation.body is not None
     solver, rate = BapSolver(), float(captured.rate)
     up = find_up(captured, mapped)
     neutral = result_figure(solver, np.zeros((1, 296), dtype=np.int32))
@@ -340,7 +339,6 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     # the balls of the feet reach the ground; those of people who sit on the edges of their shoes are above it
     assert abs(np.percentile(low, 5) - 0.0092) < (0.011 if "gesture" in name else 0.006)
     assert low.min() > -0.045
-    assert report.feet is not None
     assert report.feet.mean < 0.005
     assert report.feet.worst < 0.0125
     assert report.feet.within > 0.985

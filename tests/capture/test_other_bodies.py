@@ -54,7 +54,6 @@ def part_of(captured: SkeletonMotion, *names: str) -> SkeletonMotion:
 
 
 def value(animation: Animation, name: str) -> np.ndarray:
-    assert animation.body is not None
     return animation.body.values[:, NUMBERS[name] - 1]
 
 
@@ -184,12 +183,10 @@ def test_a_report_of_given_joints() -> None:
 def test_a_report_counts_feet_within_a_centimetre() -> None:
     captured = motion("standing", 20)
     animation = from_skeleton(captured)
-    assert animation.body is not None
     for millimetres, within in ((8, 1.0), (12, 0.75)):
         values = animation.body.values.copy()
         values[::4, NUMBERS["HumanoidRoot_tr_vertical"] - 1] += millimetres
         report = retarget_report(captured, replace(animation, body=replace(animation.body, values=values)))
-        assert report.feet is not None
         assert report.feet.within == within
         assert report.feet.worst == pytest.approx(millimetres / 1000, abs=0.001)
 

@@ -150,7 +150,6 @@ def test_feet_follow_the_ground_and_leaps() -> None:
         assert abs(ball[:15] - 0.0092 - floor).max() < 0.01
         assert ball[30] - ball[0] == pytest.approx(0.3 * scale, abs=0.01)
     report = retarget_report(captured, from_skeleton(captured))
-    assert report.feet is not None
     assert report.feet.ground == pytest.approx(-0.02 * scale, abs=1e-3)
     assert report.feet.worst < 0.01
     assert report.feet.within == 1

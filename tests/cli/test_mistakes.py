@@ -129,12 +129,10 @@ def test_joints_that_names_do_not_tell_can_be_given(run: Run, bvh: Path, tmp_pat
     joints = ["HumanoidRoot", *(f"{s}_{e}" for s in "lr" for e in ends), "vl5", "vc4", "skullbase"]
     animation = fba.read(bvh, joints=dict(zip(names, joints, strict=True)))
     assert len(animation) == 3
-    assert animation.body is not None
     assert animation.body.mask.any()
     pairs = [word for name, joint in zip(names, joints, strict=True) for word in ("--map", f"{name}={joint}")]
     assert run("convert", bvh, tmp_path / "out.bap", *pairs)[0] == 0
     written = fba.read(tmp_path / "out.bap").body
-    assert written is not None
     assert np.array_equal(written.values, animation.body.values)
 
 
@@ -238,7 +236,6 @@ def test_options_for_arguments_exist() -> None:
 
 
 def _params(command: click.Command | None) -> list[click.Parameter]:
-    assert command is not None
     found = list(command.params)
     for each in getattr(command, "commands", {}).values():
         found += _params(each)

@@ -57,7 +57,6 @@ def test_text_files_come_back_as_they_were(
 
 def test_rounded_values_are_counted(run: Run, tmp_path: Path, archive: Animation) -> None:
     """Steps of the eyes are 128: where no stream carries values as they are, that is said."""
-    assert archive.face is not None
     values = archive.face.values.copy()
     values[0, 22] = 2000  # yaw_l_eyeball
     fba.write(tmp_path / "a.fap", Animation(25, archive.index, FaceTrack(values, archive.face.mask)))
@@ -73,8 +72,6 @@ def test_streams_leave_out_what_never_moves(run: Run, tmp_path: Path, archive: A
     for arguments in (("encode", "-o"), ("convert",)):
         assert run(arguments[0], tmp_path / "a.fba", *arguments[1:], tmp_path / "b.fba").code == 0
         before, after = fba.read(tmp_path / "a.fba"), fba.read(tmp_path / "b.fba")
-        assert after.face is not None
-        assert after.body is not None
         # The outer lips are sent, too: a player would copy the inner ones.
         assert set(np.flatnonzero(after.face.mask[5])) == {2, 11, 12, 58, 59}
         assert set(np.flatnonzero(after.body.mask[15])) == {183}
@@ -93,11 +90,9 @@ def test_captured_faces_send_what_a_player_does_not_derive(
     )  # blendshapes, alike on both sides
     assert run("encode", tmp_path / "a.csv", "-o", tmp_path / "all.fba", "--preset", "reference").code == 0
     everything = fba.read(tmp_path / "all.fba").face
-    assert everything is not None
     for arguments in (("encode", "-o"), ("convert",)):
         assert run(arguments[0], tmp_path / "a.csv", *arguments[1:], tmp_path / "b.fba").code == 0
         face = fba.read(tmp_path / "b.fba").face
-        assert face is not None
         assert face.mask[:, [11, 12]].sum() == len(face)
         assert everything.mask[:, [11, 12]].all()
         assert np.array_equal(resolve(face), resolve(everything))
@@ -106,7 +101,6 @@ def test_captured_faces_send_what_a_player_does_not_derive(
     given = (tmp_path / "a.fap", SAMPLES / "hello.bvh", "-o", tmp_path / "c.fba")
     assert run("encode", *given).code == 0
     both = fba.read(tmp_path / "c.fba", bap_steps="visage").face
-    assert both is not None
     assert both.mask[5, [11, 12]].all()
 
 
@@ -151,7 +145,6 @@ def test_faps_that_the_receivers_head_computes_are_not_sent(run: Run, tmp_path: 
     fba.write(given, Animation(25, np.arange(40), FaceTrack(values, mask), name="a"))
     assert run("encode", given, "-o", stream, "--model", model).code == 0
     face = fba.read(stream).face
-    assert face is not None
     assert np.flatnonzero(face.mask.any(axis=0)).tolist() == [2]
     for outputs in (("--fap", back), ("--fap", back, "-o", tmp_path / "b.csv")):
         done = run("decode", stream, *outputs, "--shown", "--model", model)
@@ -220,8 +213,6 @@ def test_captures_are_held_still_and_files_of_baps_are_not(run: Run, tmp_path: P
         target = tmp_path / "a.fba"
         assert run("encode", source, "-o", target, *arguments).code == 0
         decoded = fba.read(target).body
-        assert decoded is not None
-        assert expected is not None
         apart = np.abs(decoded.values - expected.values)
         assert apart.max() <= (0 if expected is still else 256)  # rounding goes on from the frame before
         sizes.append(target.stat().st_size)

@@ -36,7 +36,6 @@ def pixels(path: Path) -> np.ndarray:
 
 def test_faps_by_name_and_number() -> None:
     track = still_animation(Pose(("open_jaw=800", "49=-2000"))).face
-    assert track is not None
     assert np.flatnonzero(track.mask[0]).tolist() == [2, 48]
     assert (track.values[0, 2], track.values[0, 48]) == (800, -2000)
 
@@ -57,7 +56,6 @@ def test_faps_by_name_and_number() -> None:
 )
 def test_visemes(visemes: tuple[str, ...], fields: tuple[int, int, int]) -> None:
     track = still_animation(Pose(visemes=visemes)).face
-    assert track is not None
     assert tuple(track.viseme[0]) == (*fields, 0)
     assert track.mask[0, 0]
     assert not track.mask[0, 1:].any()
@@ -65,7 +63,6 @@ def test_visemes(visemes: tuple[str, ...], fields: tuple[int, int, int]) -> None
 
 def test_expressions() -> None:
     track = still_animation(Pose(expressions=("joy=50", "2"))).face
-    assert track is not None
     assert tuple(track.expression[0]) == (1, 50, 2, 63, 0, 0)
     assert np.flatnonzero(track.mask[0]).tolist() == [1]
 

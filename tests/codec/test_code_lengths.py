@@ -120,7 +120,6 @@ def test_prices_of_the_next_plane() -> None:
     encoder.settle(11)
     before = encoder.bits
     plane = encoder.next_plane(animation[11:12])
-    assert plane is not None
     assert plane.levels(np.ones(364), 0.0).tolist() == [3]
     assert plane.levels(np.full(364, np.inf), np.inf).tolist() == [3]
     assert plane.levels(np.ones(364), np.inf).tolist() == [0]

@@ -37,7 +37,6 @@ def coded(animation: Animation, **options: object) -> tuple[np.ndarray, EncoderS
     chosen = EncoderOptions(**options)  # type: ignore[arg-type]
     data, statistics = encode_animation(animation, chosen)
     track = fba.decode(data, bap_steps=chosen.bap_steps).body
-    assert track is not None
     return track.values.astype(np.int64), statistics
 
 

@@ -33,7 +33,6 @@ def stream(table: str = "visage", *, mark: bool = True, **options: int) -> bytes
 
 
 def shoulder(animation: Animation) -> list[int]:
-    assert animation.body is not None
     return animation.body.values[:, SHOULDER].tolist()
 
 

@@ -109,7 +109,6 @@ def test_every_value_at_every_quantiser(quant: int) -> None:
     for period in (None, Fraction(1, 25)):
         source = Animation(Fraction(25), np.arange(400), track)
         got = decode(encode(source, EncoderOptions(fap_quant=quant, intra_period=period)))
-        assert got.face is not None
         check_values(values[:, 47:48], got.face.values[:, 47:48], step)
         if period is not None:  # I planes round halves toward 0 once, then away from it
             assert got.face.values[1, 47] == 0

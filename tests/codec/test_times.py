@@ -221,7 +221,6 @@ def test_masks_that_change_from_plane_to_plane() -> None:
     for block in blocks:
         frames.add(block)
     face = frames.decoded().face
-    assert face is not None
     sent = [[3]] * 2 + [[3, 4]] * 3 + [[3]]
     assert [(np.flatnonzero(row) + 1).tolist() for row in face.mask] == sent
 

@@ -153,7 +153,6 @@ def test_the_rest_of_a_damaged_skeleton_is_read_with_a_warning(
     path.write_bytes(edited(bones, change))
     with pytest.warns(FbaWarning, match=message):
         body = fba.read(path).body
-    assert body is not None
     knee = body.values[:, bap_numbers()["l_knee_flexion"] - 1]
     # feet are kept on the ground with what is left, so the knee bends a little more or less
     assert np.abs(knee - -10_000 * np.arange(FRAMES)).max() <= 5000
@@ -168,7 +167,6 @@ def test_a_shoulder_is_found_by_where_it_hangs(tmp_path: Path, bones: bytes) -> 
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             body = fba.read(path, plant=False).body
-        assert body is not None
         values.append(body.values)
     apart = np.abs(values[0] - values[1]).max(axis=0)
     apart[[bap_numbers()[f"{side}_metatarsal_flexion"] - 1 for side in "lr"]] = 0  # the ground bends toes

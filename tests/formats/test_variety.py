@@ -96,7 +96,6 @@ def test_fap(tmp_path: Path, seed: int) -> None:
     text = "".join(line + end(dice) for line in lines)
     path.write_bytes(dice.choice([b"", b"\xef\xbb\xbf"]) + text.encode())
     face = read_fap(path).face
-    assert face is not None
     assert face.values[:, 2].tolist() == values
 
 

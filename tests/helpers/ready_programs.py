@@ -64,7 +64,6 @@ def ready_programs() -> Iterator[Path]:
         command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, start_new_session=True
     )
     try:
-        assert server.stdout is not None
         assert server.stdout.readline() == b"ready\n", "the ready programs did not start"
         settings = {
             key: value for key, value in os.environ.items() if key.startswith(("NUMBA", "PYTHON", "FBA"))

@@ -69,7 +69,6 @@ class Maker:
 def truth() -> tuple[Float64, tuple[str, ...]]:
     """Matrices (T, J, 4, 4) of somebody who walks, looks around and moves their hands, and the joints."""
     walk = gait.walk(cycles=1, rate=RATE)
-    assert walk.body is not None
     values = np.array(walk.body.values[:FRAMES])
     for joint in (
         "sacroiliac",
@@ -93,7 +92,6 @@ def truth() -> tuple[Float64, tuple[str, ...]]:
     skeleton = Skeleton.default()
     matrices = BapSolver(skeleton).pose(values)
     lowest = lowest_sole(skeleton, matrices)
-    assert lowest is not None
     matrices[:, :, 1, 3] -= lowest[:, None]  # on the ground in all frames
     return matrices, skeleton.names
 

@@ -72,7 +72,6 @@ def test_frames_from_the_start_and_from_an_i_plane_after_losses(tmp_path: Path) 
     assert [time for time, _ in frames] == pytest.approx(times)
     for (_, values), number in zip(frames, expected, strict=True):
         face = FRAMES[number].face
-        assert face is not None
         np.testing.assert_array_equal(values, face.values[0])
 
 

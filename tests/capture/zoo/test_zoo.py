@@ -196,7 +196,6 @@ def test_a_person_is_restored(maker: Maker) -> None:
     wanted, names = truth()
     text, joints = write(maker)
     animation = from_skeleton(parse(text))
-    assert animation.body is not None
     found = BapSolver().pose(animation.body.values)
     number = {name: n for n, name in enumerate(names)}
     known = set(joints.values())

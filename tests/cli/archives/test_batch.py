@@ -176,7 +176,6 @@ def test_a_table_that_was_cut_off(run: Run, captures: Path, tmp_path: Path) -> N
 def write_still_heads(folder: Path, count: int) -> None:
     """Write tables of Live Link whose heads never turn: a warning for each."""
     talk = fba.read(SAMPLES / "hello.fap")
-    assert talk.face is not None
     values = talk.face.values.copy()
     values[:, 22:26] = values[:, 47:50] = 0
     still = replace(talk, face=replace(talk.face, values=values))

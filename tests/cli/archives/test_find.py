@@ -70,8 +70,6 @@ def test_pictures_become_an_animation(run: Run, made: Path, tmp_path: Path) -> N
         assert f"{target}: 3 frames" in out
         back, source = fba.read(tmp_path / target), raising()
         assert back.rate == 5
-        assert back.body is not None
-        assert source.body is not None
         off = back.body.values.astype(int) - source.body.values[[0, 2, 5]]
         assert np.abs(off).max() <= 170  # half a step of BAPs in streams
 

@@ -158,7 +158,6 @@ def test_limits_clamp(encode: Encode, tmp_path: Path) -> None:
         result = encode(path, "-o", out, "--bap-steps", "visage", "--bap-quant", "1", "--limits", limits)
         assert result.returncode == 0, result.stderr
         body = fba.decode(out.read_bytes(), bap_steps="visage").body
-        assert body is not None
         excess = {e.limit.name: e.worst for e in JointLimits.human().check(body.values)}
         assert (excess.get("left thigh flexion", 0) > 1) == beyond  # one step of the quantiser is 0.1 degrees
 
@@ -171,7 +170,6 @@ def test_spine_of_the_stream(encode: Encode, tmp_path: Path) -> None:
         options = ("--spine", spine, "--ground", "source", "--origin", "start", "--preset", "reference")
         assert encode(path, "-o", out, *options).returncode == 0
         body = fba.decode(out.read_bytes()).body
-        assert body is not None
         sent = {baps()[column].joint for column in np.flatnonzero(body.mask[0])}
         counts[spine] = sum(joint.startswith(("vl", "vt", "vc", "skull")) for joint in sent)
     assert counts == {"spread": 10, "full": 25, "simple": 4, "joints": 3}
@@ -182,7 +180,6 @@ def test_fps_resamples_by_rotation(encode: Encode, tmp_path: Path) -> None:
     out = tmp_path / "out.fba"
     assert encode(bvh(tmp_path), "-o", out, "--bap-steps", "visage", "--fps", "60").returncode == 0
     body = fba.decode(out.read_bytes(), bap_steps="visage").body
-    assert body is not None
     flexion = next(b.number - 1 for b in baps() if b.name == "l_hip_flexion")
     assert len(body.values) == 5
     assert np.degrees(body.values[3, flexion] * 1e-5) == pytest.approx(105, abs=4)

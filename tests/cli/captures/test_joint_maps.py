@@ -59,7 +59,6 @@ def test_a_unit_that_limbs_do_not_tell(run: Run, tmp_path: Path) -> None:
     assert "unit" not in err
     assert "off their path" not in err
     body = fba.read(tmp_path / "half.fba").body
-    assert body is not None
     assert np.ptp(body.values[:, bap_numbers()["HumanoidRoot_tr_lateral"] - 1]) == pytest.approx(1000, abs=3)
 
 

@@ -60,7 +60,6 @@ def test_a_proposed_mapping_is_written_changed_and_used(
     assert (code, err) == (0, "")
     assert out == f"{first}: 16 virtual markers, 3 of them fixed\n"
     proposed = read_mapping(first)
-    assert proposed.made_for is not None
     assert proposed.made_for.name == "head.obj"
     assert proposed.markers["8.2"].vertex == small_head().bound[point_rows()["8.2"]]
     code, out, err = run(

@@ -84,9 +84,7 @@ def test_files_are_shown_until_a_signal(tmp_path: Path, number: int) -> None:
         assert texts[0] == {"event": "hello", "streams": ["a <b>.fba", "b.fap"], "stream": 0}
         assert [one["event"] for one in texts] == ["hello", "start", "end"]
         shown = fba.decode(b"".join(data))
-        assert shown.body is not None
         whole = fba.decode(STREAM)
-        assert whole.body is not None
         np.testing.assert_array_equal(shown.body.values, whole.body.values)
         texts, data = watch(address, "stream?n=1")
         assert texts[0]["stream"] == 1
@@ -98,7 +96,6 @@ def test_files_are_shown_until_a_signal(tmp_path: Path, number: int) -> None:
 def test_standard_input_ends_it() -> None:
     with serving("serve", "-", "--port", 0, "--host", LOCAL, stdin=subprocess.PIPE) as (program, address):
         assert re.fullmatch(r"ws://127\.0\.0\.1:\d+/[\w-]{20,}/", address)
-        assert program.stdin is not None
         with connect(address + "stream", compression=None, proxy=None) as viewer:
             assert json.loads(viewer.recv(timeout=120))["streams"] == ["standard input"]
             program.stdin.buffer.write(STREAM)
@@ -135,7 +132,6 @@ def test_a_capture_goes_out_as_it_comes(tmp_path: Path) -> None:
             frames += arriving(viewer, decoder)
         assert program.wait(60) == 0
     recorded = fba.read(path)
-    assert recorded.face is not None
     values = np.concatenate([frame.face.values for frame in frames if frame.face is not None])
     np.testing.assert_array_equal(values, recorded.face.values)
 

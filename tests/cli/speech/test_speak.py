@@ -53,7 +53,6 @@ def test_timings_become_a_stream(coding: str, run: Run, timings: Path, tmp_path:
     assert (done.code, done.err) == (0, "")
     assert "map.fba: 0.50 s" in done.out
     face = fba.read(tmp_path / "map.fba").face
-    assert face is not None
     assert bool(face.mask[:, 0].any()) == (coding == "visemes")
 
 
@@ -87,8 +86,6 @@ def test_curves_of_arkit_are_the_motion_of_the_mouth(run: Run, timings: Path, tm
     run("convert", first, curves, "--fps", 60)
     assert run("speak", "--timings", curves, "--life", 1, "-o", again).code == 0
     meant, shown = (fba.read(path).resample(25).face for path in (first, again))
-    assert meant is not None
-    assert shown is not None
     count = min(len(meant), len(shown))
     jaws, gaps = (np.array([resolve(each)[:count, column] for each in (meant, shown)]).T for column in (2, 3))
     assert np.corrcoef(jaws.T)[0, 1] > 0.95
@@ -138,7 +135,6 @@ def test_a_mood_moves_the_brows(run: Run, timings: Path, tmp_path: Path) -> None
     target = tmp_path / "sad.fba"
     assert run("speak", "--timings", timings, "--life", 0, "--mood", "sad=80", "-o", target).code == 0
     face = fba.read(target).face
-    assert face is not None
     assert face.values[:, 30].any()
 
 
@@ -260,9 +256,6 @@ def test_a_reader_that_leaves_ends_it(programs: Path) -> None:
     command = [programs / "fba", "speak", "--audio", "-", "--pcm", "16000", "-o", "-"]
     pipe, sound = subprocess.PIPE, babble(2.0).tobytes()
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, bufsize=0) as done:
-        assert done.stdin is not None
-        assert done.stdout is not None
-        assert done.stderr is not None
         done.stdin.write(sound)
         assert done.stdout.read(100)
         done.stdout.close()

@@ -46,7 +46,6 @@ def test_declared_bones_move_the_same_body(
 ) -> None:
     path = written(tmp_path / "person.glb", extension, facing=facing, scale=scale, skin=skin)
     baps = fba.read(path, ground="source", plant=False).body
-    assert baps is not None
     solver = BapSolver()
     matrices = solver.pose(baps.values)
 

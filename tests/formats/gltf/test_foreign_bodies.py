@@ -80,7 +80,6 @@ def test_a_motion_moves_its_own_person_as_in_the_file(tmp_path: Path) -> None:
     path = write_person(tmp_path / "p.glb", clips={"pose": clip})
     body = import_body(path)
     track = fba.read(path, ground="none").body
-    assert track is not None
     shown = BapSolver(body.skeleton).pose(track.values)
     size = HIPS / 0.86
     for frame in range(frames):

@@ -268,7 +268,6 @@ def read_motion(path: Path) -> object:
     from fba.formats import format_of
 
     read = format_of(path).read_motion
-    assert read is not None
     motion = read(path)
     return match(motion.names)
 
@@ -536,7 +535,6 @@ def read_markers(path: Path) -> object:
     from fba.formats import format_of
 
     reader = format_of(path).read_face
-    assert reader is not None
     return reader(path, source_rate=Fraction(50))
 
 
