@@ -9,7 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -21,12 +21,12 @@ from websockets.exceptions import ConnectionClosed, ConnectionClosedOK
 from websockets.sync.client import ClientConnection, connect
 
 import fba
+from command_line import Run
 from fba.codec import Decoder, encode_animation
 from joinable_streams import JOINABLE, performance
 from started_programs import started
 from tools.captures.face_files import datagram
 
-Run = Callable[..., Any]
 LOCAL = "127.0.0.1"
 STREAM = encode_animation(performance(), JOINABLE)[0]
 
@@ -146,9 +146,7 @@ def test_a_capture_goes_out_as_it_comes(tmp_path: Path) -> None:
     ],
 )
 def test_mistakes(run: Run, arguments: list[str], said: str) -> None:
-    result = run(*arguments)
-    assert result.code == 2
-    assert said in result.err
+    assert said in run(*arguments, code=2).err
 
 
 def test_ports_that_cannot_be_had_and_a_missing_package(
@@ -158,16 +156,12 @@ def test_ports_that_cannot_be_had_and_a_missing_package(
     path.write_bytes(STREAM)
     with socket.create_server((LOCAL, 0)) as taken:
         port = taken.getsockname()[1]
-        result = run("serve", path, "--port", port)
-        assert result.code == 1
+        result = run("serve", path, "--port", port, code=1)
         assert f"127.0.0.1, port {port}: cannot be listened on: " in result.err
         assert "give another port" in result.err
-    result = run("serve", path, "--host", "no.such.host.invalid")
-    assert result.code == 1
+    result = run("serve", path, "--host", "no.such.host.invalid", code=1)
     assert "give an address of this computer" in result.err
     (tmp_path / "b.fba").write_bytes(b"hello")
-    assert run("serve", tmp_path / "b.fba", "--from", "fba").code == 1
+    run("serve", tmp_path / "b.fba", "--from", "fba", code=1)
     monkeypatch.setitem(sys.modules, "websockets.asyncio.server", None)
-    result = run("serve", path)
-    assert result.code == 1
-    assert "[serve]" in result.err
+    assert "[serve]" in run("serve", path, code=1).err
