@@ -75,7 +75,10 @@ def write(
     clip = start_clip(builder, times, path)
     note: dict[str, Any] = {"version": 1, "rate": str(animation.rate), "first": first}
     if animation.body is not None:
-        roots = _add_person(builder, clip, animation, note, mesh, model, body, axes)
+        from fba.body import BodyModel
+
+        person = (body or BodyModel.default()) if mesh else body
+        roots = _add_person(builder, clip, animation, note, model, person, axes)
     else:
         roots = _add_head(builder, clip, animation, note, model)
     builder.add("scenes", {"nodes": roots})
@@ -88,16 +91,17 @@ def _add_person(
     clip: Clip,
     animation: Animation,
     note: dict[str, Any],
-    mesh: bool,
     model: FaceModel | None,
-    body: BodyModel | None,
+    person: BodyModel | None,
     axes: Axes,
 ) -> list[int]:
-    """Add a person or a skeleton with its animation, and complete the note; return the root nodes."""
-    from fba.body import BapSolver, BodyModel, Skeleton
+    """Add a person or a skeleton with its animation, and complete the note; return the root nodes.
+
+    person: None for a skeleton alone.
+    """
+    from fba.body import BapSolver, Skeleton
     from fba.gltf import PartWriter
 
-    person = (body or BodyModel.default()) if mesh else body
     skeleton = Skeleton.default() if person is None else person.skeleton
     solver = BapSolver(skeleton, axes)
     nodes = nest(builder, skeleton.names, skeleton.parents)
