@@ -12,9 +12,8 @@ import pytest
 
 import fba
 from fba.carriage._joining import PATIENCE, StreamJoiner
-from fba.carriage._order import MOST_WAITING, PacketOrder
 from fba.carriage.payloads import Unit
-from fba.carriage.receiving import DatagramReader, RtpReader
+from fba.carriage.receiving import MOST_WAITING, DatagramReader, PacketOrder, RtpReader
 from fba.carriage.rtp import RtpPacket, read_packet, write_packet
 from fba.carriage.sending import DatagramWriter, units_of
 from fba.codec import Decoder, EncoderOptions, TimeCode, read_plane_start, replace_time_code, time_code

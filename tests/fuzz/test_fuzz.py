@@ -155,7 +155,7 @@ READING = {
     "persona": ("fba.persona._persona", "fba.persona.recognition._archive"),
     "live": (
         "fba.live._protocols.livelink", "fba.live._protocols.ifacialmocap", "fba.live._protocols.vtube",
-        "fba.live._protocols.vmc", "fba.live._protocols._osc",
+        "fba.live._protocols.vmc",
     ),
     "face": ("fba.face.gltf._reading",),
     "body": ("fba.body._storage",),

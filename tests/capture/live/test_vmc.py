@@ -11,10 +11,9 @@ import fba
 from fba.arrays import Float64
 from fba.body import BapSolver
 from fba.capture import SkeletonMotion, from_skeleton
-from fba.live._protocols._osc import read_messages
 from fba.live._protocols.sample import DatagramError
 from fba.live._protocols.unity_bones import joint_of, parents
-from fba.live._protocols.vmc import VmcReader
+from fba.live._protocols.vmc import VmcReader, read_messages
 from fba.parameters import fap_numbers
 from live_senders import UNITY_BONES, Sent, bundle, captured, osc, vmc_frames
 
