@@ -1,7 +1,5 @@
 """The data model: what it accepts, that it cannot be changed, slices, joins, resampling."""
 
-from __future__ import annotations
-
 import math
 import re
 import sys

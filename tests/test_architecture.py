@@ -5,8 +5,6 @@ that it begins with, and imports only from its own floor and from those below. A
 those for type checkers, and modules named in a string.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import defaultdict

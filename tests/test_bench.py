@@ -1,7 +1,5 @@
 """Tables of results: docs/measure.md, README.md, what `./dev bench --summary` prints, and the benchmarks."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

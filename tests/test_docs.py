@@ -12,8 +12,6 @@ the sample files and nothing else. The language after the three backticks says w
 A block of no language, or indented instead of fenced, is an error: nothing is left out silently.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

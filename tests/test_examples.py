@@ -1,7 +1,5 @@
 """Every example runs as it is."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Machine code on disk: found again where it is whole and up to date, made anew where it is not."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import random

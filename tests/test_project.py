@@ -1,7 +1,5 @@
 """What a stranger trips over before the first frame is coded: the scripts, the packaging, the imports."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import re

@@ -1,7 +1,5 @@
 """The sample performance that comes with fba: reproducible, within the standard's limits, and believable."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import wave

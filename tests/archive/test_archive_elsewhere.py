@@ -1,7 +1,5 @@
 """Archives that lie elsewhere, opened by fsspec: in its memory, in a folder by address, in a ZIP file."""
 
-from __future__ import annotations
-
 import pickle
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """Archives: what their rows hold, plain readers, adding to them, interruptions, labels and sounds."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

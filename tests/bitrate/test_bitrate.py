@@ -1,7 +1,5 @@
 """The study on a short sample: its rows, its files, its page; and what it says about bad input."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The page of bit rates and the README's table show the numbers in bench/results, which fit each other."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Retargeting without machine code: the same BAPs, slower."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

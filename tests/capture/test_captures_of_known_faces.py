@@ -3,8 +3,6 @@
 `python -m tools.captures measure` does the same at length.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

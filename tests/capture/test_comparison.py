@@ -1,7 +1,5 @@
 """A capture beside its result: each measure sees its fault, and says how large it is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path

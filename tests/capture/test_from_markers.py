@@ -1,7 +1,5 @@
 """Markers on faces whose FAPs are known: these come back, from other heads and from damaged captures."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache

@@ -1,7 +1,5 @@
 """Captured skeletons become BAPs whose bones point where the source's bones point."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Bodies that lack joints, sources of few joints, and other orders of the axes, by geometry."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Feet on the ground: heights, slip, slopes, and what that costs the legs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What becomes of spines, clavicles, forearms, fingers and feet; families of names; the report."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any

@@ -1,7 +1,5 @@
 """Which way is up, of people in all postures, in files of all axes; nobody is stood up who lies."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Virtual markers of lids, which move rows, and eyes that look at the camera."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Streams over a network that loses, overtakes and doubles packets: every frame that is shown is right."""
 
-from __future__ import annotations
-
 import random
 from collections import deque
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The command line as a function: arguments in, exit code and output out."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`fba emote`: moods on the command line, over time, from keys, side by side."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

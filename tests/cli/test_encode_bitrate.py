@@ -1,7 +1,5 @@
 """`fba encode --bitrate`: what it prints, what it refuses, and that the file keeps what it promises."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

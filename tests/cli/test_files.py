@@ -1,7 +1,5 @@
 """encode, decode, convert, info, stats, bench, conformance on files made here."""
 
-from __future__ import annotations
-
 import io
 import json
 import shlex

@@ -1,7 +1,5 @@
 """Exit codes, one-line errors, help."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

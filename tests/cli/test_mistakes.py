@@ -1,7 +1,5 @@
 """Mistakes of users: what the program then says names options that exist, and files that are meant."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """`fba model`: what it prints and writes, and how it fails."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`fba model learn-fit`: what it prints and writes, and how it fails."""
 
-from __future__ import annotations
-
 import json
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`fba model points`: what is said before and after the window, which other tests open."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

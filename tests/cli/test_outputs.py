@@ -1,7 +1,5 @@
 """Where commands write: never onto what they read; "-" is standard output; pipes and devices stay."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """`fba persona`: learn, info and play; files that are none, of other versions, or damaged."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

@@ -1,7 +1,5 @@
 """`fba play`: what it hands to the window, and what it refuses."""
 
-from __future__ import annotations
-
 import io
 import os
 import threading

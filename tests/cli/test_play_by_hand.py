@@ -1,7 +1,5 @@
 """`fba play` without a file: a neutral figure to move by hand."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

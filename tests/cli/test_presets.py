@@ -1,7 +1,5 @@
 """What `fba encode` and `fba convert` send unless told otherwise, and options that contradict each other."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`fba render`: files, and without one faces by FAPs, visemes and expressions, and contact sheets."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

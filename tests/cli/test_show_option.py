@@ -1,7 +1,5 @@
 """`--show`: switches of the player, in pictures from the command line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

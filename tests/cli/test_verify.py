@@ -1,7 +1,5 @@
 """`fba verify`: complete, cut, damaged and changed streams."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import struct

@@ -1,7 +1,5 @@
 """decode --output and convert: files for other programs, and the options of their writers."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

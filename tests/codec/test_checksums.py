@@ -1,7 +1,5 @@
 """The CRC-32 of each I period behind the end of a stream: flipped bits are noticed."""
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from functools import cache

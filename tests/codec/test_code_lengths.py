@@ -1,7 +1,5 @@
 """Code lengths are those of the coder; quantised values are those of the decoder."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

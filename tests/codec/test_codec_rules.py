@@ -1,7 +1,5 @@
 """Decision constants and rules of the codec: each has a test here that dies with it."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

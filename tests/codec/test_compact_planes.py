@@ -1,7 +1,5 @@
 """Planes that hold nearly nothing: they take little memory and time, however many there are."""
 
-from __future__ import annotations
-
 import tracemalloc
 from collections.abc import Callable
 from functools import partial

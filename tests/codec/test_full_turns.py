@@ -1,7 +1,5 @@
 """Angles that pass half a turn: coded the short way or by an I plane, and what cannot be sent is named."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

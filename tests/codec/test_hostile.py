@@ -1,7 +1,5 @@
 """Streams made to do harm: huge claims, endless headers, floods of start codes, what is reserved."""
 
-from __future__ import annotations
-
 import time
 import tracemalloc
 import warnings

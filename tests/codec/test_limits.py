@@ -1,7 +1,5 @@
 """What the syntax cannot carry: refused with parameter, frame and the way out, or clamped and counted."""
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 

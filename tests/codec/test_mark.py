@@ -1,7 +1,5 @@
 """The mark behind the end of a stream, which names its table of BAP steps."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whatever an animation holds, encoding and decoding gives it back, each value to the nearest step."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

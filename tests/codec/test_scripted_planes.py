@@ -1,7 +1,5 @@
 """Planes encoded as they are told to be, and what settings that do not fit are answered with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

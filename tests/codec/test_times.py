@@ -1,7 +1,5 @@
 """Frame rates, skips and time codes, in exact fractions."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction

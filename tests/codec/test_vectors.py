@@ -1,7 +1,5 @@
 """Streams of real applications and of another encoder: values, masks, bytes and times must be exact."""
 
-from __future__ import annotations
-
 import json
 import os
 import warnings

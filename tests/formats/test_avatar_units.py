@@ -1,7 +1,5 @@
 """Avatar animation units: bytes of others, streams and containers in and out, and bad ones."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zipfile

@@ -1,7 +1,5 @@
 """Skeletons that are damaged or meant to hurt: an error that names the place, or what is there and a word."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from fractions import Fraction

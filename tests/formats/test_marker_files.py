@@ -1,7 +1,5 @@
 """Captures of markers in every format: what is written comes back, damage is an error."""
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Which format a file is in, what its options are, and everything that is no such file."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import io

@@ -1,7 +1,5 @@
 """How a stream's table of BAP steps is chosen: by its mark, else by the way it moves, else the standard's."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from fractions import Fraction

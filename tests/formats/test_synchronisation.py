@@ -1,7 +1,5 @@
 """A face and a body on one clock: time codes, offsets, rates, and what only one of them covers."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

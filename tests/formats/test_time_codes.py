@@ -1,7 +1,5 @@
 """Time codes and times of day: what they count, midnight, drop frame, and what is none."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

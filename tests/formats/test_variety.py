@@ -2,8 +2,6 @@
 with a seed. Each reads as the plain file does.
 """
 
-from __future__ import annotations
-
 import random
 import warnings
 from collections.abc import Callable

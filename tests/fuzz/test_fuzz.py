@@ -3,8 +3,6 @@
 `./dev fuzz` and the fuzz stage of `.ci/run` try many more.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import json

@@ -1,7 +1,5 @@
 """What a glTF file says, as arrays: numbers follow from the description of the format."""
 
-from __future__ import annotations
-
 import base64
 import json
 import warnings

@@ -1,7 +1,5 @@
 """Surfaces in the frame of the scene: what a viewer would show."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

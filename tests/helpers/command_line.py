@@ -1,7 +1,5 @@
 """The type of the fixture `run`: the command line as a function."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, Protocol
 
 

@@ -8,8 +8,6 @@ change what was imported (`NUMBA_...`, `PYTHON...`, `FBA_...`), or a Python with
 is started as usual.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import json

@@ -1,7 +1,5 @@
 """The default person in motion, written as BVH text in the conventions of many makers."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """The index: what is found in it, its file, and files that are none."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

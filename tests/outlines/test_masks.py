@@ -1,7 +1,5 @@
 """Figures cut out of pictures: transparent and plain backgrounds, and pictures without a figure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

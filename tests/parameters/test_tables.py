@@ -1,7 +1,5 @@
 """The standard's tables: sizes, groups, steps and limits, against figures from outside the CSV files."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

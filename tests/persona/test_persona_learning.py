@@ -1,7 +1,5 @@
 """Learning an actor's way, and playing a user's performance in it."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Amplitude, speed and sides of a face's motion: measured, stored, given to another person's performance."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Bodies within a tolerance: what is sent is measured here, on the decoded stream, by the joints' points."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

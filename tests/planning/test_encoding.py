@@ -1,7 +1,5 @@
 """`fba.encode` and `encode_stream`: each choice makes the stream of its function; mistakes are told."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Faces within a tolerance: measured on every vertex of the decoded stream, with the deformer alone."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Plans for receivers with a head whose interpolation table (FIT) gives FAPs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Live streams with nothing known before: what is shown comes back, and little is sent."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Plans: nothing that is sent or shown changes, and streams become smaller."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Streams at a bit rate: every plane fits the buffer, and what is lost falls as the rate rises."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from fractions import Fraction

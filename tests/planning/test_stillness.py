@@ -1,7 +1,5 @@
 """Bodies whose joints and feet rest after decoding as they do in the capture, measured on decoded streams."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

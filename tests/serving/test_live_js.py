@@ -1,7 +1,5 @@
 """The client in the page, in node, with a connection that the test plays."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil

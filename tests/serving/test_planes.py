@@ -1,7 +1,5 @@
 """Streams as planes: joined they are the stream, and a decoder may begin wherever one says so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

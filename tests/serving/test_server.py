@@ -1,7 +1,5 @@
 """The server, over real sockets of the loopback: who is let in, and what comes out."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import re

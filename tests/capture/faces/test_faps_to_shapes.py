@@ -1,7 +1,5 @@
 """FAPs to blendshapes and back: weights that come out as they went in, visemes, tables that are written."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

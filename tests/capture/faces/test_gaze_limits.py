@@ -1,7 +1,5 @@
 """Eyes that turn further than eyes do, from every kind of source."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Blendshapes to FAPs: sums of shapes, lips brought together, lids that meet, times and errors."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

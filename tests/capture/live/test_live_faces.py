@@ -1,7 +1,5 @@
 """Faces that arrive live: the stream is that of the same capture in a file, and what is wrong is counted."""
 
-from __future__ import annotations
-
 import io
 import socket
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """The VMC protocol: bodies from Unity's bones, faces from expressions, and OSC that is damaged."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

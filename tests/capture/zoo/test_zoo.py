@@ -1,7 +1,5 @@
 """The default person, animated by a known motion and written as many makers do, comes back as it was."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

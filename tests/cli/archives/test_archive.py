@@ -1,7 +1,5 @@
 """`fba archive`: reports for people and programs, exit codes, wrong usage."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

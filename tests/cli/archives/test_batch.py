@@ -1,7 +1,5 @@
 """`fba convert --batch`: the same results as one by one, failures, interruptions, and going on."""
 
-from __future__ import annotations
-
 import csv
 import os
 import shutil

@@ -1,7 +1,5 @@
 """`fba find`: building an index, and what it prints and writes for pictures."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`fba encode` of motion capture: options, report, limits."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Captured faces on the command line: what `fba info` lists, and options that their readers take."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

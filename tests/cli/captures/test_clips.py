@@ -1,7 +1,5 @@
 """`--clip`: the animation that commands read of a glTF file with several."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

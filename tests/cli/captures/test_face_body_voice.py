@@ -1,7 +1,5 @@
 """`fba encode` of a face, a body and a voice that were recorded at one moment."""
 
-from __future__ import annotations
-
 import json
 import wave
 from pathlib import Path

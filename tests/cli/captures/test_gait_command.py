@@ -1,7 +1,5 @@
 """`fba gait`: what it writes and prints, and how it fails."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`--map` and `--map-out`: joints of captures that names do not tell, and maps in TOML files."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`fba capture` and `fba send` over the loopback, and what they refuse."""
 
-from __future__ import annotations
-
 import json
 import signal
 import socket

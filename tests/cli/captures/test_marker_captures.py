@@ -1,7 +1,5 @@
 """`fba encode` and `fba info` of captures of markers."""
 
-from __future__ import annotations
-
 import json
 import sys
 from functools import cache

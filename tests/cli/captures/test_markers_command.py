@@ -1,7 +1,5 @@
 """`fba markers`: pictures, films, animated heads and mappings without a window; what is refused."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """`fba model photos`: from pictures and points to a head, what is said, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

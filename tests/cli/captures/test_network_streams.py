@@ -1,7 +1,5 @@
 """`fba send`, `fba capture` and `fba serve` with addresses: streams over the loopback, and mistakes."""
 
-from __future__ import annotations
-
 import json
 import socket
 import threading

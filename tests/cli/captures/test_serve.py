@@ -1,7 +1,5 @@
 """`fba serve` and `fba capture --serve`, from the command line to a viewer."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

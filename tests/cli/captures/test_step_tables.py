@@ -1,7 +1,5 @@
 """The table of BAP steps: which one is written and read, and what users are told about it."""
 
-from __future__ import annotations
-
 import io
 import json
 import shlex

@@ -1,7 +1,5 @@
 """MP4 files on the command line: converted with sound and back, and read by all commands for streams."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import wave

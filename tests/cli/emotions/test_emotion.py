@@ -1,7 +1,5 @@
 """`fba emotion`: what files with a face show."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

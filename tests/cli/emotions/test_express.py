@@ -1,7 +1,5 @@
 """`fba express`: streams, pictures and tables of named expressions and mixtures."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

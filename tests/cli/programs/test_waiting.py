@@ -1,7 +1,5 @@
 """What is said while a command takes long: that it compiles, and how far it is."""
 
-from __future__ import annotations
-
 import io
 import os
 import subprocess

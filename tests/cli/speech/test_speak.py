@@ -1,7 +1,5 @@
 """`fba speak` and `fba decode --visemes`: what is written, and what is said of bad input."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib.util
 import json

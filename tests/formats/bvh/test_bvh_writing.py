@@ -1,7 +1,5 @@
 """BVH written: what other programs rely on, and that reading it gives the same performance."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

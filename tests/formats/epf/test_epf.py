@@ -1,7 +1,5 @@
 """EPF files: what each tag means, contradictions, the 177 real ones both ways."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

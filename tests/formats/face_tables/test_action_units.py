@@ -1,7 +1,5 @@
 """Tables of OpenFace and py-feat, written from known intensities, poses and gazes: they come back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Datagrams, text records and JSON of captured faces, written from known weights: they come back."""
 
-from __future__ import annotations
-
 import json
 import struct
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tables of blendshapes, written from known weights in all the ways that are found: they come back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

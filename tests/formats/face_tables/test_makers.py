@@ -1,7 +1,5 @@
 """Tables of faces in all the ways that makers vary them, from one known face: it comes back."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from collections.abc import Iterator

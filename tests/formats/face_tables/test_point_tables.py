@@ -1,7 +1,5 @@
 """Files of tracked points: every layout gives the points, and what is none of a known tracker is refused."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

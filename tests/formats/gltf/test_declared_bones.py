@@ -1,7 +1,5 @@
 """Bones that a file declares: VRM 0, which faces -z, VRM 1 and VRMA, whatever their nodes are called."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

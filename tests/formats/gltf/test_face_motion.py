@@ -1,7 +1,5 @@
 """Faces that move in glTF files become FAPs: named morph targets, expressions and gaze of VRMA, bones."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Skinned people of other makers as bodies for display, driven by BAPs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """FAPs read back from glTF: the same as were written, told by the motion that the file shows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

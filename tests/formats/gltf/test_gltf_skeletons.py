@@ -1,7 +1,5 @@
 """glTF skeletons in all the ways exporters leave them: the same motion gives the same BAPs."""
 
-from __future__ import annotations
-
 import warnings
 from fractions import Fraction
 from pathlib import Path

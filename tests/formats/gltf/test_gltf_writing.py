@@ -1,7 +1,5 @@
 """glTF written: the official validator's opinion, where every vertex ends up, and reading it back."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Heads of foreign bodies: FAPs mix their shapes, by name or as VRM declares them, and turn their eyes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

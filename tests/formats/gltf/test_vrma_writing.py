@@ -1,7 +1,5 @@
 """VRM animations that are written: expressions, gaze and head come back; the document is as VRM wants it."""
 
-from __future__ import annotations
-
 import json
 import struct
 from pathlib import Path

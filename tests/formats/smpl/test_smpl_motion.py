@@ -1,7 +1,5 @@
 """Motion of SMPL's bodies: layouts of poses, axes, jaw and eyes, rates, and files that are none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

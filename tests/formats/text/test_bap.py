@@ -1,7 +1,5 @@
 """BAP files: both widths, scales, round trips, the real ones."""
 
-from __future__ import annotations
-
 import tempfile
 import warnings
 from pathlib import Path

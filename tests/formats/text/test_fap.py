@@ -1,7 +1,5 @@
 """FAP files: the real ones, the odd ones, the broken ones, and round trips."""
 
-from __future__ import annotations
-
 import tempfile
 import warnings
 from fractions import Fraction

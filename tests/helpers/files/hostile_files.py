@@ -4,8 +4,6 @@
 that a reader might search again and again, or unpack: tokens, names, nodes, brackets, quotes, skipped frames.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 import zipfile
