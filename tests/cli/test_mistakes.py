@@ -120,8 +120,7 @@ def test_joints_that_names_do_not_tell_can_be_given(run: Run, bvh: Path, tmp_pat
     assert animation.body.mask.any()
     pairs = [word for name, joint in zip(names, joints, strict=True) for word in ("--map", f"{name}={joint}")]
     run("convert", bvh, tmp_path / "out.bap", *pairs)
-    written = fba.read(tmp_path / "out.bap").body
-    assert np.array_equal(written.values, animation.body.values)
+    assert np.array_equal(fba.read(tmp_path / "out.bap").body.values, animation.body.values)
 
 
 def test_joints_of_a_body_are_given_as_options(run: Run, tmp_path: Path, face: Animation) -> None:

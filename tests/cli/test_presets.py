@@ -96,8 +96,7 @@ def test_captured_faces_send_what_a_player_does_not_derive(
     fba.write(tmp_path / "a.fap", Animation(25, archive.index, archive.face))
     given = (tmp_path / "a.fap", SAMPLES / "hello.bvh", "-o", tmp_path / "c.fba")
     run("encode", *given)
-    both = fba.read(tmp_path / "c.fba", bap_steps="visage").face
-    assert both.mask[5, [11, 12]].all()
+    assert fba.read(tmp_path / "c.fba", bap_steps="visage").face.mask[5, [11, 12]].all()
 
 
 @pytest.mark.parametrize(
@@ -140,8 +139,7 @@ def test_faps_that_the_receivers_head_computes_are_not_sent(run: Run, tmp_path: 
     given, stream, back = tmp_path / "a.fap", tmp_path / "a.fba", tmp_path / "b.fap"
     fba.write(given, Animation(25, np.arange(40), FaceTrack(values, mask), name="a"))
     run("encode", given, "-o", stream, "--model", model)
-    face = fba.read(stream).face
-    assert np.flatnonzero(face.mask.any(axis=0)).tolist() == [2]
+    assert np.flatnonzero(fba.read(stream).face.mask.any(axis=0)).tolist() == [2]
     for outputs in (("--fap", back), ("--fap", back, "-o", tmp_path / "b.csv")):
         assert run("decode", stream, *outputs, "--shown", "--model", model).err == ""
         assert fba.read(back).face.values.tolist() == values.tolist()  # type: ignore[union-attr]
@@ -203,8 +201,7 @@ def test_captures_are_held_still_and_files_of_baps_are_not(run: Run, tmp_path: P
     ):
         target = tmp_path / "a.fba"
         run("encode", source, "-o", target, *arguments)
-        decoded = fba.read(target).body
-        apart = np.abs(decoded.values - expected.values)
+        apart = np.abs(fba.read(target).body.values - expected.values)
         assert apart.max() <= (0 if expected is still else 256)  # rounding goes on from the frame before
         sizes.append(target.stat().st_size)
     assert sizes[0] < 0.99 * sizes[1]

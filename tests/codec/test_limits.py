@@ -96,8 +96,7 @@ def test_clamped_values_are_counted_and_the_nearest_possible() -> None:
     with pytest.raises(RangeError, match="400000 cannot be carried"):
         encode(animation)
     coded, statistics = encode_animation(animation, EncoderOptions(clamp=True))
-    got = decode(coded).face
-    values = got.values[:, 47].tolist()
+    values = decode(coded).face.values[:, 47].tolist()
     nearest = [400_010, -400_010]  # multiples of 170 next to +-400000 ...
     assert nearest[0] == 2353 * 170
     assert values[0] == largest

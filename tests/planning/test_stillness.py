@@ -37,8 +37,7 @@ def one_bap(values: np.ndarray, column: int = WRIST) -> fba.Animation:
 
 def held(animation: fba.Animation, options: EncoderOptions = VISAGE) -> np.ndarray:
     """What `hold_still` makes of the BAPs, (T, 296)."""
-    track = hold_still(animation, options).body
-    return track.values
+    return hold_still(animation, options).body.values
 
 
 def steps_of(options: EncoderOptions) -> np.ndarray:
@@ -77,8 +76,7 @@ def test_a_joint_that_rests_between_two_levels_stays_on_one() -> None:
     rng = np.random.default_rng(1)
     for count in (200, 5000):
         animation = one_bap(np.rint(20.45 * STEP + rng.normal(0, 0.05 * STEP, count)))
-        rounded = quantise(animation, VISAGE).body
-        assert np.count_nonzero(np.diff(rounded.values[:, WRIST])) > count / 10
+        assert np.count_nonzero(np.diff(quantise(animation, VISAGE).body.values[:, WRIST])) > count / 10
         assert not np.diff(held(animation)[:, WRIST]).any()
 
 

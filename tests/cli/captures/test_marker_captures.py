@@ -90,8 +90,7 @@ def test_no_face(run: Run, tmp_path: Path) -> None:
 
 def test_convert(run: Run, capture: Path, tmp_path: Path) -> None:
     run("convert", capture, tmp_path / "a.fap")
-    face = fba.read(tmp_path / "a.fap").face
-    assert len(face) == 200
+    assert len(fba.read(tmp_path / "a.fap").face) == 200
 
 
 def test_standard_input_gives_the_same_stream(

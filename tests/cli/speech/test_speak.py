@@ -50,8 +50,7 @@ def test_timings_become_a_stream(coding: str, run: Run, timings: Path, tmp_path:
     done = run("speak", "--timings", timings, "--coding", coding, "--life", 0, "-o", tmp_path / "map.fba")
     assert done.err == ""
     assert "map.fba: 0.50 s" in done.out
-    face = fba.read(tmp_path / "map.fba").face
-    assert bool(face.mask[:, 0].any()) == (coding == "visemes")
+    assert bool(fba.read(tmp_path / "map.fba").face.mask[:, 0].any()) == (coding == "visemes")
 
 
 def test_every_sound_is_kept_where_that_is_asked(run: Run, tmp_path: Path) -> None:
@@ -128,8 +127,7 @@ def test_mistakes_are_told(arguments: list[str], said: str, run: Run, timings: P
 def test_a_mood_moves_the_brows(run: Run, timings: Path, tmp_path: Path) -> None:
     target = tmp_path / "sad.fba"
     run("speak", "--timings", timings, "--life", 0, "--mood", "sad=80", "-o", target)
-    face = fba.read(target).face
-    assert face.values[:, 30].any()
+    assert fba.read(target).face.values[:, 30].any()
 
 
 @needs_voice

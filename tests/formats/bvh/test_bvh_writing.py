@@ -147,8 +147,7 @@ def test_a_file_of_another_pose_is_still_retargeted(tmp_path: Path) -> None:
         body(np.zeros((2, BAP_COUNT))),
         skeleton=Skeleton(plain.names, plain.parents, centres),
     )
-    back = fba.read(tmp_path / "t.bvh").body
-    pose = BapSolver().pose(back.values[0])
+    pose = BapSolver().pose(fba.read(tmp_path / "t.bvh").body.values[0])
     arm = pose[plain.number("l_elbow"), :3, 3] - pose[plain.number("l_shoulder"), :3, 3]
     assert arm[0] / np.linalg.norm(arm) > 0.99  # still out to the left
 

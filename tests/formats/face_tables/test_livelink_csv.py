@@ -37,8 +37,7 @@ def shape(path: Path, name: str, **options: str) -> Float64:
 
 
 def fap(path: Path, name: str) -> Float64:
-    face = fba.read(path).face
-    return face.values[:, fap_numbers()[name] - 1].astype(float)
+    return fba.read(path).face.values[:, fap_numbers()[name] - 1].astype(float)
 
 
 def jaw_forward(weights: Float64) -> dict[str, Float64]:

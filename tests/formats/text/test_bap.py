@@ -40,8 +40,7 @@ def test_a_file_may_change_its_width(tmp_path: Path) -> None:
 
 def test_angle_scale_leaves_millimetres_alone(tmp_path: Path) -> None:
     path = file(tmp_path, "a.bap", "3.1 a 30 1", mask(1, 181, 184, width=186), "0 3 1000 -3")
-    body = read_bap(path, angle_scale=1.5).body
-    assert body.values[0, [0, 180, 183]].tolist() == [5, 1000, -5]
+    assert read_bap(path, angle_scale=1.5).body.values[0, [0, 180, 183]].tolist() == [5, 1000, -5]
     with pytest.raises(FormatError, match=r"must lie in .* after angle_scale 1e\+10"):
         read_bap(path, angle_scale=1e10)
     for scale in (0, float("nan"), "x"):

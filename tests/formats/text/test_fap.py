@@ -63,8 +63,7 @@ def test_floats_round_half_away_from_zero_with_one_warning(tmp_path: Path) -> No
 
 def test_angle_scale_touches_angles_only(tmp_path: Path) -> None:
     path = file(tmp_path, "a.fap", "2.0 a 25 1", mask(3, 48), "0 10 10")
-    face = read_fap(path, angle_scale=50).face
-    assert face.values[0, [2, 47]].tolist() == [10, 500]
+    assert read_fap(path, angle_scale=50).face.values[0, [2, 47]].tolist() == [10, 500]
 
 
 def test_the_frame_count_of_the_header_is_a_hint(tmp_path: Path) -> None:
