@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
 from fba.arrays import Float64
-from fba.errors import FbaWarning, ModelError, OptionError
+from fba.errors import ModelError, OptionError, warn
 from fba.persona._curves import measure_curves
 from fba.persona._observation import Neutral, Observation, observe
 from fba.persona._persona import SHARE_OF_WIDTH, PartStyle, Persona, part_width
@@ -58,10 +57,11 @@ def learn(
     frames, turned = sum(map(len, faces)), sum(int(take.registered.turned.sum()) for take in takes)
     lost = sum(int((~face.tracked).sum()) for face in faces)
     if turned or lost:
-        warnings.warn(
+        warn(
             f"of {frames} frames, {lost} have no face, and in {turned} the head is turned by more than "
-            "30 degrees: they are left out", FbaWarning, stacklevel=2,
-        )  # fmt: skip
+            "30 degrees: they are left out",
+            stacklevel=2,
+        )
     return Persona(name or faces[0].name, still, parts, frames, len(moved), turned, lost)
 
 

@@ -8,7 +8,6 @@ describes what is approximate.
 from __future__ import annotations
 
 import os
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.choices import Axes
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError, warn
 from fba.formats.gltf._joints import Clip, move, nest, start_clip
 from fba.gltf import Builder
 from fba.source import Path
@@ -185,11 +184,7 @@ def _make_head(
 
     if person.eyes is None:
         if animation.face is not None or model is not None:
-            warnings.warn(
-                f"the body {person.name!r} has no position for a face; none is shown",
-                FbaWarning,
-                stacklevel=5,
-            )
+            warn(f"the body {person.name!r} has no position for a face; none is shown", stacklevel=5)
         return None
     face = model or FaceModel.default()
     return start_head(builder, clip, face, _shown(animation, face), person)

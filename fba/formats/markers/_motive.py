@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import re
-import warnings
 from contextlib import suppress
 from pathlib import Path as FilePath
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError, warn
 from fba.formats.markers._rows import (
     METRES,
     build_motion,
@@ -137,10 +136,10 @@ def _find_markers(rows: list[list[str]], columns: list[str], path: Path) -> list
             continue
         labelled = [one for one in markers if not re.match(r"(.*:)?unlabell?ed\b", one[0], re.IGNORECASE)]
         if labelled and len(labelled) < len(markers):
-            warnings.warn(
+            warn(
                 f"{path}: {len(markers) - len(labelled)} columns of markers without a label are left out",
-                FbaWarning, stacklevel=3,
-            )  # fmt: skip
+                stacklevel=3,
+            )
         return labelled or markers
     raise FormatError(
         "holds no markers, only rigid bodies or bones; export markers from Motive as well", path=path

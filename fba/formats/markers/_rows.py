@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -11,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
 from fba.choices import FileUpAxis
-from fba.errors import FbaWarning, FormatError, Remedy
+from fba.errors import FormatError, Remedy, warn
 from fba.formats.text.frame_rates import Rate, parse_rate
 from fba.limits import Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -140,11 +139,7 @@ def build_motion(
 def warn_if_cut(path: Path, stated: float, count: int) -> None:
     """Warn (FbaWarning) if a file does not hold as many frames as it states; NaN where it states nothing."""
     if np.isfinite(stated) and stated != count:
-        warnings.warn(
-            f"{path}: says that it has {stated:g} frames, but holds {count}; these are read",
-            FbaWarning,
-            stacklevel=3,
-        )
+        warn(f"{path}: says that it has {stated:g} frames, but holds {count}; these are read", stacklevel=3)
 
 
 def file_rate(stored: float | str, source_rate: Rate | None, path: Path) -> Fraction:
