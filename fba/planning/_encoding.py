@@ -219,10 +219,7 @@ def _options(options: EncoderOptions | None, given: dict[str, Any]) -> EncoderOp
 
 
 def _goal(
-    animation: Animation,
-    preset: Preset | None,
-    tolerance: float | Tolerance | None,
-    bit_rate: float | None,
+    animation: Animation, preset: Preset | None, tolerance: float | Tolerance | None, bit_rate: float | None
 ) -> Goal | None:
     """Return the goal that keywords of `encode` name; None for the preset of the options."""
     choices = {"preset": preset, "tolerance": tolerance, "bit_rate": bit_rate}

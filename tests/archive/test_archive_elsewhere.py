@@ -16,15 +16,7 @@ pytest.importorskip("duckdb")
 import fsspec
 
 import archived
-from fba.archive import (
-    Archive,
-    Windows,
-    describe_archive,
-    extract,
-    index_archive,
-    query,
-    verify_archive,
-)
+from fba.archive import Archive, Windows, describe_archive, extract, index_archive, query, verify_archive
 from fba.errors import FbaError, FormatError, OptionError
 
 ADDRESS = "memory://elsewhere/archive"

@@ -291,7 +291,7 @@ def test_forward_kinematics_against_scipy() -> None:
 
 
 GROUNDED = {
-    "greta/c-ladder.bvh": 0.3,  # climbs
+    "greta/c-ladder.bvh": 0.3  # climbs
 }
 """Least share of frames in which the shown person's soles are within 5 mm of the ground; others: 0.95."""
 STANCE = 0.85

@@ -56,8 +56,7 @@ def value(animation: Animation, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "missing",
-    ["acromioclavicular", "skullbase", "subtalar", "metatarsal midtarsal", "vl2 vl3 vl4"],
+    "missing", ["acromioclavicular", "skullbase", "subtalar", "metatarsal midtarsal", "vl2 vl3 vl4"]
 )
 def test_a_body_without_some_joints_still_points_every_bone(missing: str) -> None:
     solver = body_without(*missing.split())

@@ -194,10 +194,7 @@ def test_standard_input_is_an_input_as_well(here: Path, programs: Path) -> None:
         ("decode both.fba --fap x --bap sub/../x", "are the same file"),
         ("decode both.fba --fap - --bap -", "--fap and --bap both go to standard output"),
         ("decode both.fba --fap /dev/stdout -o - --to bvh", "both go to standard output"),
-        (
-            "decode both.fba sub/both.fba --fap out",
-            "both.fba and sub/both.fba would both become out",
-        ),
+        ("decode both.fba sub/both.fba --fap out", "both.fba and sub/both.fba would both become out"),
         ("decode both.fba both.fba --fap out", "both.fba is given twice"),
         ("decode both.fba sub/talk.fba --fap -", "need a folder for --fap, and - is not a folder"),
         ("decode sub/talk.fba sub/talk.fap --fap sub", "would overwrite the input sub/talk.fap"),

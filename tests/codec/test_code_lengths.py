@@ -5,13 +5,7 @@ import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
-from fba.codec import (
-    Encoder,
-    coarsest_quantisers,
-    count_rounded,
-    exact_quantisers,
-    quantise,
-)
+from fba.codec import Encoder, coarsest_quantisers, count_rounded, exact_quantisers, quantise
 from fba.parameters import bap_steps, faps
 from fba.planning._code_lengths import code_lengths
 

@@ -21,16 +21,7 @@ from codec_streams import (
     packed,
     segment,
 )
-from fba import (
-    BitstreamError,
-    Decoder,
-    FbaError,
-    FbaWarning,
-    LimitError,
-    Limits,
-    UnsupportedError,
-    decode,
-)
+from fba import BitstreamError, Decoder, FbaError, FbaWarning, LimitError, Limits, UnsupportedError, decode
 from fba.codec import probe_stream
 from fba.parameters import bap_groups
 from fba_conformance._textbook import FrequencyTable, encode_segment

@@ -19,9 +19,7 @@ PERIODS = st.sampled_from([None, None, Fraction(1, 100), Fraction(1, 5), 2.5])
 
 
 def check_values(
-    source: npt.NDArray[np.int32],
-    got: npt.NDArray[np.int32],
-    step: npt.NDArray[np.int64],
+    source: npt.NDArray[np.int32], got: npt.NDArray[np.int32], step: npt.NDArray[np.int64]
 ) -> None:
     """The standard's rule: nearest multiple of the step, so off by half a step at most."""
     assert (2 * np.abs(got.astype(np.int64) - source) <= step).all()

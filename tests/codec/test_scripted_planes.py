@@ -56,10 +56,7 @@ def test_planes_code_the_frames_that_they_name() -> None:
 
 @pytest.mark.parametrize(
     ("planes", "message"),
-    [
-        ([], "no planes to encode"),
-        ([predicted(10)], "plane 0 is a P plane before the first I plane"),
-    ],
+    [([], "no planes to encode"), ([predicted(10)], "plane 0 is a P plane before the first I plane")],
 )
 def test_planes_in_an_order_that_cannot_be_coded(planes: list[PlaneSettings], message: str) -> None:
     with pytest.raises(ValueError, match=message):

@@ -140,9 +140,7 @@ def split(whole: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [
-        (split, "has several skeletons; 'HumanoidRoot' is read, the others are left out: vl5"),
-    ],
+    [(split, "has several skeletons; 'HumanoidRoot' is read, the others are left out: vl5")],
 )
 def test_the_rest_of_a_damaged_skeleton_is_read_with_a_warning(
     tmp_path: Path, bones: bytes, change: Callable[[dict[str, Any]], None], message: str

@@ -9,12 +9,7 @@ import pytest
 from fba.capture.markers._motion import MarkerMotion
 from fba.errors import FormatError
 from fba.formats import format_of
-from fba.formats.time_codes import (
-    parse_time_code,
-    parse_time_of_day,
-    read_time_codes,
-    seconds_between,
-)
+from fba.formats.time_codes import parse_time_code, parse_time_of_day, read_time_codes, seconds_between
 from fba.sampling import regular_times
 from tools.captures import marker_files
 

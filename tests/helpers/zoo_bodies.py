@@ -68,13 +68,7 @@ def truth() -> tuple[Float64, tuple[str, ...]]:
     """Matrices (T, J, 4, 4) of somebody who walks, looks around and moves their hands, and the joints."""
     walk = gait.walk(cycles=1, rate=RATE)
     values = np.array(walk.body.values[:FRAMES])
-    for joint in (
-        "sacroiliac",
-        "subtalar",
-        "midtarsal",
-        "acromioclavicular",
-        "sternoclavicular",
-    ):
+    for joint in ("sacroiliac", "subtalar", "midtarsal", "acromioclavicular", "sternoclavicular"):
         for bap in baps():  # joints that most makers lack stand still
             if joint in bap.joint:
                 values[:, bap.number - 1] = 0

@@ -68,9 +68,7 @@ def test_a_body_stays_within_a_centimetre_in_far_fewer_bytes(gesture: tuple[byte
     )
 
 
-def test_frames_that_a_player_can_interpolate_are_left_out(
-    gesture: tuple[bytes, NearLossless],
-) -> None:
+def test_frames_that_a_player_can_interpolate_are_left_out(gesture: tuple[bytes, NearLossless]) -> None:
     data, near = gesture
     sent = len(decode(data, bap_steps="visage"))
     assert sent == len(GESTURE) - near.left_out

@@ -176,9 +176,7 @@ def test_quantisers_are_as_coarse_as_the_values() -> None:
     with_viseme = replace(
         animation,
         face=FaceTrack(
-            values,
-            mask | (np.arange(68) == 0),
-            np.tile(np.array([1, 2, 63, 0], dtype=np.int16), (40, 1)),
+            values, mask | (np.arange(68) == 0), np.tile(np.array([1, 2, 63, 0], dtype=np.int16), (40, 1))
         ),
     )
     assert coarsest_quantisers(with_viseme, options).fap_quant == 3  # 63 = 21 x 3

@@ -18,13 +18,7 @@ from fba.capture.points._lifting import lift
 from fba.capture.points._motion import PointMotion
 from fba.capture.points._neutral import find_rests
 from fba.capture.points.picture import face_misfit, upright_points
-from fba.capture.points.places import (
-    check_places,
-    fill_points,
-    find_still,
-    point_places,
-    take_points,
-)
+from fba.capture.points.places import check_places, fill_points, find_still, point_places, take_points
 from fba.choices import Gaze
 from fba.errors import ModelError, OptionError, warn
 from fba.face import FaceModel

@@ -151,10 +151,7 @@ def test_of_two_senders_the_first_or_the_one_that_is_named() -> None:
     first, summary = captured("livelink", mixed, say=said.append)
     assert first == captured("livelink", at_rate(SENT))[0]
     assert dict(summary.other_senders) == {"'Bo' (10.0.0.2)": ROWS}
-    assert said == [
-        "receiving from 'iPhone' (10.0.0.2)",
-        "'Bo' (10.0.0.2) also sends, and is left out",
-    ]
+    assert said == ["receiving from 'iPhone' (10.0.0.2)", "'Bo' (10.0.0.2) also sends, and is left out"]
     named, _ = captured("livelink", mixed, sender="Bo")
     assert named == captured("livelink", at_rate(other))[0]
     assert captured("livelink", mixed, sender="Cy")[0] is None

@@ -144,8 +144,7 @@ def test_wrong_usage(
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
-    [("a,b\n1,2\n", "is no table of conversions"), ("", "is no table of conversions")],
+    ("content", "message"), [("a,b\n1,2\n", "is no table of conversions"), ("", "is no table of conversions")]
 )
 def test_another_table_in_the_folder(
     run: Run, captures: Path, tmp_path: Path, content: str, message: str

@@ -145,10 +145,7 @@ def test_voices_that_do_not_fit(run: Run, table: Path, tmp_path: Path) -> None:
         (("-o", "-", "--audio", voice), "give the stream a name with -o"),
         (("-o", tmp_path / "a.fba", "--audio-offset", "1"), "--audio-offset needs a sound"),
         (("-o", tmp_path / "a.fba", "--audio", table), "cannot be read as sound"),
-        (
-            ("-o", tmp_path / "a.fba", "--audio", voice),
-            "lasts from 18:49:59.50 to 18:50:00.50, and",
-        ),
+        (("-o", tmp_path / "a.fba", "--audio", voice), "lasts from 18:49:59.50 to 18:50:00.50, and"),
     ):
         done = run("encode", table, *options, code=None)
         assert done.code in (1, 2)

@@ -105,11 +105,7 @@ def test_two_senders(tmp_path: Path) -> None:
     ("data", "error", "said"),
     [
         (b"\x05" + datagram([0.0] * 61, 1.0)[1:], UnsupportedError, "byte 0: .* version 5; only version 6"),
-        (
-            struct.pack(">HH", 1, 4) + b"face" + bytes(60),
-            UnsupportedError,
-            "version 1 of the MetaHuman mode",
-        ),
+        (struct.pack(">HH", 1, 4) + b"face" + bytes(60), UnsupportedError, "version 1 of the MetaHuman mode"),
         (datagram([0.0] * 61, 1.0) + b"garbage", FormatError, "byte 312: no datagram of Live Link Face"),
         (datagram([0.0] * 61, 1.0)[:100], FormatError, "holds no complete datagram"),
         (

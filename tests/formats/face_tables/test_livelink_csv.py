@@ -10,15 +10,7 @@ from fba.arrays import Float64
 from fba.errors import FbaWarning, FormatError, LimitError, OptionError
 from fba.formats.face_tables._livelink_csv import read_face
 from fba.parameters import fap_numbers
-from tools.captures.face_files import (
-    ANGLES,
-    STEP,
-    UDP_ORDER,
-    camel,
-    face_angles,
-    face_weights,
-    livelink_csv,
-)
+from tools.captures.face_files import ANGLES, STEP, UDP_ORDER, camel, face_angles, face_weights, livelink_csv
 
 ROWS = 90
 WEIGHTS = face_weights(ROWS)
