@@ -1,6 +1,5 @@
 """encode, decode, convert, info, stats, bench, conformance on files made here."""
 
-import io
 import json
 import shlex
 import sys
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 
 import fba
-from command_line import Run
+from command_line import Run, pipe_in
 from fba import Animation, FaceTrack
 
 
@@ -154,10 +153,7 @@ def test_motion_capture(run: Run, tmp_path: Path, bvh: Path) -> None:
 def test_standard_input_and_output(
     run: Run, tmp_path: Path, face_file: Path, face: Animation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Pipe(io.StringIO):
-        buffer = io.BytesIO(face_file.read_bytes())
-
-    monkeypatch.setattr(sys, "stdin", Pipe())
+    pipe_in(monkeypatch, face_file.read_bytes())
     stream = tmp_path / "x.fba"
     run("encode", "-", "-o", stream)
     assert fba.read(stream) == face

@@ -1,9 +1,7 @@
 """Mistakes of users: what the program then says names options that exist, and files that are meant."""
 
-import io
 import json
 import re
-import sys
 from pathlib import Path
 
 import click
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 
 import fba
-from command_line import Run
+from command_line import Run, pipe_in
 from fba import Animation
 from fba.cli.main import _COMMANDS, group
 from fba.errors import FormatError, Remedy
@@ -264,13 +262,10 @@ def test_errors_about_other_files_name_their_format(
 
 
 def test_standard_input_is_called_so(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    class Stdin:
-        buffer = io.BytesIO()
-
-    monkeypatch.setattr(sys, "stdin", Stdin)
+    pipe_in(monkeypatch, b"")
     err = run("encode", "-", "-o", tmp_path / "x.fba", code=1).err
     assert err == "fba: error: standard input: is empty (0 bytes); was it fully copied or written?\n"
-    Stdin.buffer = io.BytesIO(b"2.2 a 25 9\n" + b"1 " * 68 + b"\n")
+    pipe_in(monkeypatch, b"2.2 a 25 9\n" + b"1 " * 68 + b"\n")
     assert run("info", "-", code=1).err.startswith("fba: error: standard input:2: the last frame is cut")
 
 

@@ -1,6 +1,5 @@
 """`fba play`: what it hands to the window, and what it refuses."""
 
-import io
 import os
 import threading
 import time
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 import fba
-from command_line import Run
+from command_line import Run, pipe_in
 from fba import Animation, player
 from fba_player.playback.live import LiveAnimation
 from fba_player.scene.compare import CompareScene
@@ -59,16 +58,6 @@ def write_wav(path: Path) -> Path:
         file.setframerate(8000)
         file.writeframes(np.zeros(800, dtype=np.int16).tobytes())
     return path
-
-
-def pipe_in(monkeypatch: pytest.MonkeyPatch, data: bytes, terminal: bool = False) -> None:
-    class Stdin:
-        buffer = io.BufferedReader(io.BytesIO(data))  # type: ignore[arg-type]
-
-        def isatty(self) -> bool:
-            return terminal
-
-    monkeypatch.setattr("sys.stdin", Stdin())
 
 
 def test_a_file_is_played(run: Run, window: Window, talk: Path) -> None:

@@ -72,8 +72,6 @@ def read_markers(
     rows, numbers = parse_rows(
         _without_codes(lines, row + 1, columns), row + 1, ",", len(columns), path, limits
     )
-    if not len(rows):
-        raise FormatError("holds no frames", path=path)
     second = next((n for n, cell in enumerate(columns) if cell.lower().startswith("time (")), None)
     times = rows[:, second] if second is not None else np.full(len(rows), np.nan)
     stored: str | float = settings.get("export frame rate", "") or settings.get("capture frame rate", "")

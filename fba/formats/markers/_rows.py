@@ -56,11 +56,14 @@ def parse_rows(
     """Return rows of numbers, float64 (T, columns), NaN for gaps, and the line of each row (1-based).
 
     first, last: the first line to read, and the line at which to stop. Empty lines are skipped. Missing cells
-    at the end of a row are gaps. Raises FormatError for a cell that is no number, and for too many cells.
+    at the end of a row are gaps. Raises FormatError for a cell that is no number, for too many cells, and
+    without rows.
     """
     if columns > MOST_COLUMNS:
         raise FormatError(f"has {columns} columns, more than the {MOST_COLUMNS} that are read", path=path)
     numbers = [n for n in range(first, len(lines) if last is None else last) if lines[n].strip(" \t,;")]
+    if not numbers:
+        raise FormatError("holds no frames", path=path)
     limits.check_frames(len(numbers), f"{path}: a capture")
     source = sum(len(lines[n]) + 1 for n in numbers)
     limits.check_bytes(2 * 8 * columns * len(numbers), f"{path}: a capture", source=source)

@@ -1,16 +1,14 @@
 """`fba encode` and `fba info` of captures of markers."""
 
 import json
-import sys
 from functools import cache
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fba
-from command_line import Run
+from command_line import Run, pipe_in
 from fba.face import FaceModel
 from tools.captures import marker_files
 from tools.captures.marked_actor import Take, perform
@@ -99,11 +97,7 @@ def test_standard_input_gives_the_same_stream(
     """Steps of BAPs and clamping go by the content, of which the name "-" says nothing."""
     from_file, from_input = tmp_path / "a.fba", tmp_path / "b.fba"
     run("encode", capture, "-o", from_file)
-
-    class Stdin:
-        buffer = BytesIO(capture.read_bytes())
-
-    monkeypatch.setattr(sys, "stdin", Stdin)
+    pipe_in(monkeypatch, capture.read_bytes())
     run("encode", "-", "-o", from_input)
     assert from_input.read_bytes()[-40:] == from_file.read_bytes()[-40:]
     mine, theirs = fba.read(from_input), fba.read(from_file)

@@ -1,6 +1,5 @@
 """The table of BAP steps: which one is written and read, and what users are told about it."""
 
-import io
 import json
 import shlex
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any
 import pytest
 
 import fba
-from command_line import Run
+from command_line import Run, pipe_in
 from fba import Animation, player
 from fba.body import gait
 from fba.codec import marked_table
@@ -224,17 +223,10 @@ def test_a_stream_that_arrives(run: Run, walk: Path, monkeypatch: pytest.MonkeyP
         assert build().animation.wait_end(300)
         return ()
 
-    class Stdin:
-        def __init__(self) -> None:
-            self.buffer = io.BufferedReader(io.BytesIO(walk.read_bytes()))  # type: ignore[arg-type]
-
-        def isatty(self) -> bool:
-            return False
-
     monkeypatch.setattr(player, "play", play)
-    monkeypatch.setattr("sys.stdin", Stdin())
+    pipe_in(monkeypatch, walk.read_bytes())
     assert run("play", "-", "--bap-steps", "iso").err.startswith(f"fba: warning: standard input: {WARNED}")
-    monkeypatch.setattr("sys.stdin", Stdin())
+    pipe_in(monkeypatch, walk.read_bytes())
     assert run("play", "-", "--bap-steps", "visage").err == ""
-    monkeypatch.setattr("sys.stdin", Stdin())
+    pipe_in(monkeypatch, walk.read_bytes())
     assert run("play", "-").err.startswith(f"fba: standard input: {CHOSEN}")
