@@ -110,19 +110,7 @@ class FaceTrack:
 
         parts: each a track and its number of frames; None for a track that sends nothing.
         """
-        parts = list(parts)
-        if len(parts) == 1 or all(track is None for track, _ in parts):
-            return parts[0][0] if parts else None
-        tracks = [track if track is not None else cls.empty(count) for track, count in parts]
-        return cls(
-            _stack([t.values for t in tracks]),
-            _stack([t.mask for t in tracks]),
-            _stack([t.viseme for t in tracks]),
-            _stack([t.expression for t in tracks]),
-            _stack([t.interpolated if t.interpolated is not None else np.zeros_like(t.mask) for t in tracks])
-            if any(t.interpolated is not None for t in tracks)
-            else None,
-        )
+        return _join(cls, list(parts))
 
     def __len__(self) -> int:
         return len(self._compact[1]) if self._compact is not None else len(self.values)
@@ -195,11 +183,7 @@ class BodyTrack:
 
         parts: each a track and its number of frames; None for a track that sends nothing.
         """
-        parts = list(parts)
-        if len(parts) == 1 or all(track is None for track, _ in parts):
-            return parts[0][0] if parts else None
-        tracks = [track if track is not None else cls.empty(count) for track, count in parts]
-        return cls(_stack([t.values for t in tracks]), _stack([t.mask for t in tracks]))
+        return _join(cls, list(parts))
 
     def __len__(self) -> int:
         return len(self._compact[1]) if self._compact is not None else len(self.values)
@@ -405,11 +389,19 @@ def freeze(instance: object, **fields: object) -> None:
         object.__setattr__(instance, name, value)
 
 
-def _stack(arrays: list[Array]) -> Array:
-    """Return the arrays joined, read-only, so that a track need not copy them."""
-    stacked = np.concatenate(arrays)
-    stacked.flags.writeable = False
-    return stacked
+def _join(kind: type[Track], parts: list[tuple[Track | None, int]]) -> Track | None:
+    """Return what `join` does. Arrays are made read-only, so that the track need not copy them."""
+    if len(parts) == 1 or all(track is None for track, _ in parts):
+        return parts[0][0] if parts else None
+    tracks = [track if track is not None else kind.empty(count) for track, count in parts]
+    joined = {}
+    for name in kind.__slots__:
+        arrays = [] if name == "_compact" else [getattr(track, name) for track in tracks]
+        if any(array is not None for array in arrays):  # frames without `interpolated` ask for none
+            filled = [np.zeros_like(t.mask) if a is None else a for t, a in zip(tracks, arrays, strict=True)]
+            joined[name] = np.concatenate(filled)
+            joined[name].flags.writeable = False
+    return kind(**joined)
 
 
 def hold(values: Array, mask: Bool, before: Array) -> Array:

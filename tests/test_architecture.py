@@ -5,8 +5,6 @@ that it begins with, and imports only from its own floor and from those below. A
 those for type checkers, and modules named in a string.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import defaultdict
@@ -137,10 +135,7 @@ FACADES = {
     ("fba", "*"): "the public names of the library, imported where they are first used",
     ("fba.face", "*"): "public names of the face",
     ("fba.body", "*"): "public names of the body",
-    (
-        "fba.formats._registry",
-        "fba.formats.*",
-    ): "the table of formats: readers and writers by name",
+    ("fba.formats._registry", "fba.formats.*"): "the table of formats: readers and writers by name",
     ("fba.planning", "fba.planning._encoding"): "the function over all ways to encode, bit rates among them",
     ("fba.cli.main", "fba.cli.commands.*"): "the subcommands by name",
     ("fba.face.model", "fba.face.gltf._storage"): "`FaceModel.load` and `save`",

@@ -1,7 +1,5 @@
 """Tables of results: docs/measure.md, README.md, what `./dev bench --summary` prints, and the benchmarks."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -107,9 +105,7 @@ def test_a_row_without_a_figure_says_why() -> None:
     )
 
 
-def test_the_summary_is_measured_and_printed(
-    tmp_path: Path,
-) -> None:
+def test_the_summary_is_measured_and_printed(tmp_path: Path) -> None:
     """On benchmarks of its own: one that measures, one that is skipped, one that fails."""
     (tmp_path / "bench").mkdir()
     (tmp_path / "bench" / "test_small.py").write_text(

@@ -1,7 +1,5 @@
 """What is kept on disk is found again, and never trusted."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

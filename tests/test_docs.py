@@ -12,8 +12,6 @@ the sample files and nothing else. The language after the three backticks says w
 A block of no language, or indented instead of fenced, is an error: nothing is left out silently.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex
@@ -54,10 +52,7 @@ POOR = "fba: poor: walk.bvh: right hand faces 129 degrees off in frame 407; --re
 ILLUSTRATIONS = {
     ("README.md", "./dev demo --out demo"): CHECKOUT,
     ("README.md", ". .venv/bin/activate"): "chooses an environment",
-    (
-        "README.md",
-        'pip install ".[player]"',
-    ): "makes an environment, as .ci/run does",
+    ("README.md", 'pip install ".[player]"'): "makes an environment, as .ci/run does",
     ("CONTRIBUTING.md", "./dev setup"): CHECKOUT,
     ("docs/bitrate.md", "./dev bitrate -o study"): "measures for a minute; tests/bitrate runs the command",
     ("docs/capture-live.md", "fba capture livelink --play -o face.fba"): WINDOW,
@@ -82,10 +77,7 @@ ILLUSTRATIONS = {
     ("docs/speak.md", 'fba speak --text "Good morning. The blue boat moves away." -o morning.fba'): VOICE,
     ("docs/speak.md", "fba speak --audio talk.wav --text-file talk.txt -o talk.fba"): VOICE,
     ("docs/speak.md", 'pip install "mpeg4-fba[speech]"'): "makes an environment, as .ci/run does",
-    (
-        "docs/speak.md",
-        'fba speak --audio rede.wav --text "Guten Morgen" --language de-de -o rede.fba',
-    ): VOICE,
+    ("docs/speak.md", 'fba speak --audio rede.wav --text "Guten Morgen" --language de-de -o rede.fba'): VOICE,
     (
         "docs/archives.md",
         "fba archive make streams/ --folders subject,emotion -o s3://training/faces",
@@ -99,10 +91,7 @@ ILLUSTRATIONS = {
     ("docs/develop.md", "./dev test"): CHECKOUT,
     ("docs/develop.md", "./dev bounds"): "takes hours; .ci/run runs a part, tests/fuzz the command",
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",
-    (
-        "docs/develop.md",
-        "./dev fuzz --target bvh fuzz-findings/bvh-seed7-1234",
-    ): "a file found there",
+    ("docs/develop.md", "./dev fuzz --target bvh fuzz-findings/bvh-seed7-1234"): "a file found there",
     ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
     (
         "docs/develop.md",
@@ -128,10 +117,7 @@ ILLUSTRATIONS = {
     ): "takes minutes; tests/persona has fewer contents",
     ("docs/persona.md", "python -m tools.persona.blind_test"): "takes minutes; tests/persona has fewer takes",
     ("docs/persona.md", "python -m tools.persona.training -o default.recogniser"): "trains for a minute",
-    (
-        "docs/photos.md",
-        "$ fba model photos front.jpg side.jpg -o me.glb --edit me.points.json",
-    ): WINDOW,
+    ("docs/photos.md", "$ fba model photos front.jpg side.jpg -o me.glb --edit me.points.json"): WINDOW,
     ("docs/play.md", "fba play face.fba"): WINDOW,
     ("docs/play.md", "fba play"): WINDOW,
     ("docs/play.md", "fba play face.fba --audio voice.mp3 --audio-offset -0.04"): WINDOW,
@@ -143,10 +129,7 @@ ILLUSTRATIONS = {
         "docs/web.md",
         'fba conformance --decoder "node player/fba_player/web/conformance.mjs {in} {out} {bap_steps}"',
     ): "needs node.js and takes a minute; tests/player/web runs the program",
-    (
-        "docs/play.md",
-        "import fba, pyrender",
-    ): "pyrender is not installed; tests/player has tests of it",
+    ("docs/play.md", "import fba, pyrender"): "pyrender is not installed; tests/player has tests of it",
 }
 """Blocks that do not run: page and first line, and why not."""
 

@@ -1,7 +1,5 @@
 """Every example runs as it is."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from collections.abc import Callable
@@ -78,7 +76,6 @@ def test_frames_arrive_soon_after_they_are_sent(run: Callable[[str], str]) -> No
     printed = run("05_stream_in_chunks.py")
     assert re.search(EXPECTED["05_stream_in_chunks.py"], printed, re.DOTALL)
     latency = re.search(r"latency: ([0-9.]+) frames", printed)
-    assert latency is not None
     assert 0 < float(latency[1]) <= 3
 
 

@@ -2,8 +2,6 @@
 memory at most, whatever they repeat. What is refused, is refused with an error of ours.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

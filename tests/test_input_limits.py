@@ -1,7 +1,5 @@
 """`fba.Limits`: what is beyond them is refused with the limit, what was found, and the option that helps."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

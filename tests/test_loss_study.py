@@ -1,7 +1,5 @@
 """The study of losses: `python -m bench.codec.loss`, shortened."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from random import Random
 

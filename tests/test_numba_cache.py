@@ -1,7 +1,5 @@
 """Machine code on disk: found again where it is whole and up to date, made anew where it is not."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import random
@@ -60,7 +58,6 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Mo
         modules = []
         for one in (helper, name):
             spec = importlib.util.spec_from_file_location(one, tmp_path / f"{one}.py")
-            assert spec is not None
             assert spec.loader is not None
             modules.append(importlib.util.module_from_spec(spec))
             monkeypatch.setitem(sys.modules, one, modules[-1])

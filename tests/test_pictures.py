@@ -1,7 +1,5 @@
 """The pictures of the documentation: one command makes each of them, and each is shown somewhere."""
 
-from __future__ import annotations
-
 import re
 import sys
 from importlib import import_module

@@ -1,7 +1,5 @@
 """What a stranger trips over before the first frame is coded: the scripts, the packaging, the imports."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import re
@@ -83,7 +81,6 @@ def test_script_runs_as_it_is(script: str, shell: str) -> None:
 def test_ci_leaves_to_the_coverage_what_that_runs() -> None:
     """On the oldest Python, each test runs in one stage, but for long ones and those of the documentation."""
     rooms = re.search(r"rooms='([^']*)'", (ROOT / "dev").read_text(encoding="utf-8"))
-    assert rooms is not None
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     left_out = re.findall(r"--ignore=tests/([^\s)]+)", script)
     assert left_out == [*rooms[1].split(), "player/web"]  # ./dev web runs the last
@@ -159,22 +156,13 @@ def test_public_name_can_be_imported(name: str) -> None:
 def test_rooms_are_imported_where_they_are_first_used() -> None:
     """As docstrings have it: `import fba`, and then `fba.persona.learn`, each in a process of its own."""
     code = "import fba; print(*(fba.__getattr__(name).__name__ for name in fba._MODULES))"
-    for use in (
-        "persona.learn",
-        "planning.encode_planned",
-        "live.Capture",
-        "body.BodyModel",
-    ):
+    for use in ("persona.learn", "planning.encode_planned", "live.Capture", "body.BodyModel"):
         subprocess.run([sys.executable, "-c", f"import fba; fba.{use}"], cwd=ROOT, check=True)
     listed = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     rooms = {path.parent.name for path in (ROOT / "fba").glob("*/__init__.py")}
-    assert rooms - {name.removeprefix("fba.") for name in listed.stdout.split()} == {
-        "cli",
-        "gltf",
-        "mesh",
-    }
+    assert rooms - {name.removeprefix("fba.") for name in listed.stdout.split()} == {"cli", "gltf", "mesh"}
 
 
 def test_all_packages_say_that_they_are_typed() -> None:
@@ -325,10 +313,7 @@ def test_the_plain_package_needs_only_what_encodes_converts_and_draws_a_picture(
 
 
 INSTALLS = re.compile(r"\bpip3?(?: --python \S+)? install((?:[ \t]+[^\s`|&;)]+)+)")
-FOREIGN = {
-    "docs/capture-points.md: mediapipe",
-    "examples/track_a_film/track_a_film.py: mediapipe",
-}
+FOREIGN = {"docs/capture-points.md: mediapipe", "examples/track_a_film/track_a_film.py: mediapipe"}
 """Programs of others that a page tells to install, in an environment of their own."""
 CURES = re.compile(r"\bcure\(\w+, [\"']([^\"']+)[\"']\)")
 

@@ -1,7 +1,5 @@
 """The programs that start at once do what the installed ones do."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from pathlib import Path

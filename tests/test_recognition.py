@@ -1,7 +1,5 @@
 """What a file seems to be, by its first bytes."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import zipfile

@@ -1,7 +1,5 @@
 """The sample performance that comes with fba: reproducible, within the standard's limits, and believable."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import wave
@@ -48,7 +46,6 @@ def decoded() -> fba.Animation:
 def joints() -> dict[str, npt.NDArray[np.float64]]:
     """Joint -> places (T, 3) in metres, of what a receiver shows."""
     body = decoded().body
-    assert body is not None
     solver = BapSolver()
     matrices = solver.pose(body.values)
     return {name: matrices[:, number, :3, 3] for number, name in enumerate(solver.skeleton.names)}
@@ -87,7 +84,6 @@ def test_markers_say_what_the_face_says() -> None:
     talk = fba.read(SAMPLES / "talk.c3d", neutral="first")
     performed = perform_track(fba.read(SAMPLES / "hello.fap"), 50)[: len(talk)]
     assert len(talk) == 300
-    assert talk.face is not None
     told = tuple(fap for fap in (3, 14, *range(16, 21), *range(31, 43), *range(51, 65)))
     assert talk.face.mask[0, np.array(told) - 1].all()
     errors = root_mean_squares(talk.face.values.astype(float), performed, told)
@@ -134,8 +130,6 @@ def test_bit_rate() -> None:
 
 def test_decoded_close_to_the_capture() -> None:
     before, after = performance().body, decoded().body
-    assert before is not None
-    assert after is not None
     turns = [b.number - 1 for b in baps() if b.unit != "mm" and before.mask[0, b.number - 1]]
     assert np.abs(after.values - before.values)[:, turns].max() < 400  # 1e-5 rad: a quarter of a degree
 
@@ -148,7 +142,6 @@ def test_feet_stand(joint: str) -> None:
 
 def test_knees_never_bend_backward() -> None:
     body = decoded().body
-    assert body is not None
     for side in "lr":
         assert body.values[:, bap_numbers()[f"{side}_knee_flexion"] - 1].max() < 0
 
@@ -214,7 +207,6 @@ def test_looks_at_us_while_waving() -> None:
     rate = float(performance().rate)
     at = round(2.0 * rate)
     body = decoded().body
-    assert body is not None
     model = fba.face.FeaturePointFace()
     turn = BapSolver().pose(body.values[at])[list(BapSolver().skeleton.names).index("skullbase"), :3, :3]
     turn = turn @ model.head_rotation(shown()[at])

@@ -7,12 +7,11 @@ Implements ISO/IEC 14496-2, FBA object, without code of `fba.codec`, and is hund
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any, cast
 
-from fba.errors import FbaError, FbaWarning
+from fba.errors import FbaError, warn
 from fba.parameters import BAP_STEP_TABLES, BapTable
 from fba.recognition import HEAD_BYTES, recognition_hint
 from fba_conformance._part import HighLevel, Part
@@ -246,10 +245,9 @@ class Walker:
             record["time_code"] = (hours, minutes, marker, seconds)
             self.clock = Fraction((hours * 60 + minutes) * 60 + seconds)
             if not marker:
-                warnings.warn(
+                warn(
                     f"plane {reader.plane}, bit {reader.bit - 7}: the marker bit of the time code is 0, "
                     "expected 1; the time code was read all the same",
-                    FbaWarning,
                     stacklevel=2,
                 )
         skip = 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from fba.arrays import Int16
 from fba.atomic import PathLike
 from fba.audio._pyav import av_version, import_av
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError, warn
 
 CHANNELS = 2
 PLAYABLE_RATES = (8000, 192_000)
@@ -209,9 +208,7 @@ class SoundFile:
     def _warn(self, error: Exception) -> None:
         if not self._damaged:
             self._damaged = True
-            warnings.warn(
-                f"{self.path}: part of the sound is damaged and left out: {error}", FbaWarning, stacklevel=2
-            )
+            warn(f"{self.path}: part of the sound is damaged and left out: {error}", stacklevel=2)
 
 
 class _Converter:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from fractions import Fraction
@@ -14,7 +13,7 @@ from fba.capture.markers._faces import from_markers
 from fba.capture.markers._motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion
 from fba.capture.points import PointMotion, from_points
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 
@@ -58,7 +57,7 @@ def make_animation(
     errors of these functions.
     """
     for finding in getattr(capture, "findings", ()):
-        warnings.warn(f"{path}: {finding}", FbaWarning, stacklevel=4)
+        warn(f"{path}: {finding}", stacklevel=4)
     with naming_file(path):
         if isinstance(capture, SkeletonMotion):
             return retarget_motion(capture, rate, SkeletonOptions(**options), limits=limits)

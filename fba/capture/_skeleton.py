@@ -25,7 +25,7 @@ from fba.capture.bones import LIMBS
 from fba.capture.motion import MappedMotion, SkeletonMotion
 from fba.capture.preparation import Preparation, prepare
 from fba.choices import Ground, Origin, SignedUpAxis, Spine
-from fba.errors import FbaWarning, ModelError, Remedy
+from fba.errors import FbaWarning, ModelError, Remedy, warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.tracks import BodyTrack
 
@@ -191,11 +191,7 @@ def _warn_of_missing(mapped: Mapping[str, int]) -> None:
         joint for limb in LIMBS for joint in limb if any(j in mapped for j in limb) and joint not in mapped
     ]
     if missing:
-        warnings.warn(
-            f"the source has no joints for {', '.join(missing)}; they stay as they are",
-            FbaWarning,
-            stacklevel=4,
-        )
+        warn(f"the source has no joints for {', '.join(missing)}; they stay as they are", stacklevel=4)
 
 
 def _check_frames(motion: SkeletonMotion, rate: Fraction, limits: Limits) -> None:

@@ -6,7 +6,6 @@ assert read_mp4(data).stream == stream
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +16,7 @@ from fba.carriage._samples import PlaneSamples, join_samples, split_samples
 from fba.carriage._sound import SoundTrack
 from fba.carriage._tracks import Mp4Track, choose_track, read_tracks
 from fba.carriage._writer import write_mp4, write_sound
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError, warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path
 
@@ -124,7 +123,7 @@ def _take(data: bytes, samples: SampleTable, path: Path | None, *, salvage: bool
         )
         if not salvage or not first:
             raise FormatError(finding, path=path)
-        warnings.warn(f"{finding}; the {first} samples before it are read", FbaWarning, stacklevel=3)
+        warn(f"{finding}; the {first} samples before it are read", stacklevel=3)
         count = first
     if int(samples.sizes[:count].sum()) > len(data):
         raise FormatError(

@@ -6,7 +6,6 @@ import contextlib
 import os
 import stat
 import sys
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from fba.cli.inputs import Reading
 from fba.cli.live_streams import Receiving
 from fba.cli.map_options import MAP, Maps, read_body_joints
 from fba.cli.option_fields import option
-from fba.errors import FbaError, FbaWarning, FormatError
+from fba.errors import FbaError, FormatError, warn
 from fba.source import read_head, read_whole
 
 if TYPE_CHECKING:
@@ -320,7 +319,7 @@ def _choose_sound(files: tuple[Path, ...], sound: SoundOptions, without: str) ->
         try:
             check_sound(path)
         except FormatError as error:
-            warnings.warn(f"{without}: {error}", FbaWarning, stacklevel=3)
+            warn(f"{without}: {error}", stacklevel=3)
             continue
         return path
     return None

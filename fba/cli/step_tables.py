@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ import click
 
 from fba.choices import BapTableOrAuto
 from fba.cli.command import as_typed
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_AUTO, BAP_STEPS_DEFAULT, BapTable, bap_numbers, bap_steps
 from fba.tracks import batches
@@ -94,10 +93,9 @@ def warn_of_coarse_steps(
     steps = bap_steps(table)[root]
     between = any((batch.values[:, root] % steps).any() for batch in batches(animation.body))
     if captured or between:
-        warnings.warn(
+        warn(
             "the standard's BAP steps move the root by 64 mm at a time and code angles up to 1.19 rad; "
             f"--bap-steps {FINE} has 2 mm and 3.16 rad",
-            FbaWarning,
             stacklevel=2,
         )
 
@@ -127,7 +125,7 @@ def warn_of_doubt(
     if doubt is None:
         return None
     text = f"{_display_name(name)}: {doubt}"
-    warnings.warn(text, FbaWarning, stacklevel=2)
+    warn(text, stacklevel=2)
     return text
 
 

@@ -12,7 +12,7 @@ from fba.codec._frame_buffers import CompactBuffer
 from fba.codec._stream.damage import Damage
 from fba.codec._stream.mark import find_marks
 from fba.codec._stream_reader import NO_END, StreamReader
-from fba.errors import BitstreamError, FbaWarning
+from fba.errors import BitstreamError, FbaWarning, warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BapTable
 
@@ -129,9 +129,9 @@ def decode(
     for block in read_blocks(reader, view):
         frames.add(block)
     if on_error == "raise" and reader.planes and reader.objects.end_code is None:
-        warnings.warn(f"plane {reader.planes - 1}: {NO_END}", FbaWarning, stacklevel=2)
+        warn(f"plane {reader.planes - 1}: {NO_END}", stacklevel=2)
     for damage in reader.damage:
-        warnings.warn(str(damage), FbaWarning, stacklevel=2)
+        warn(str(damage), stacklevel=2)
     if not frames.frames:
         error = reader.damage[0].error if reader.damage else None
         raise BitstreamError("the stream holds no plane that can be decoded", plane=0) from error

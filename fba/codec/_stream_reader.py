@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Literal
 
@@ -16,7 +15,7 @@ from fba.codec._stream.damage import Damage, DamageLog
 from fba.codec._stream.mark import MAX_MARK_BYTES, START, USER_DATA, Mark, bytes_needed
 from fba.codec._stream.object_borders import ObjectBorders
 from fba.codec._stream.plane_times import PlaneTimes
-from fba.errors import BitstreamError, FbaWarning, LimitError, UnsupportedError
+from fba.errors import BitstreamError, LimitError, UnsupportedError, warn
 from fba.limits import Limits
 from fba.parameters import BAP_STEP_TABLES, BapTable
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -460,7 +459,7 @@ class StreamReader:
 
     @staticmethod
     def _warn(text: str) -> None:
-        warnings.warn(text, FbaWarning, stacklevel=2)
+        warn(text, stacklevel=2)
 
 
 def _forget_frames(error: Exception) -> None:

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import inspect
 import os
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
-from fba.errors import FbaWarning, FormatError, OptionError, Remedy, UnsupportedError, did_you_mean
+from fba.errors import FormatError, OptionError, Remedy, UnsupportedError, did_you_mean, warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BapTable
 from fba.recognition import recognition_hint
@@ -276,10 +275,9 @@ def format_of(path: Path, format: str | None = None) -> Format:
             raise error
         raise error.with_remedies(Remedy("format", "if it is one of them, name it with {}", "'bvh'"))
     if by_suffix and match not in by_suffix and suffix not in COMMON_SUFFIXES:
-        warnings.warn(
+        warn(
             f"{os.fspath(path)}: is named {suffix}, but holds {match.name.upper()} content; "
             f"read as {match.name}",
-            FbaWarning,
             stacklevel=3,
         )
     return match
@@ -339,10 +337,9 @@ def write(path: Path, animation: Animation, *, format: str | None = None, **opti
     assert writer.write is not None  # or writer_for had raised
     writer.write(path, animation, **options)
     if left_out:
-        warnings.warn(
+        warn(
             f"{os.fspath(path)}: {writer.name.upper()} holds no {left_out[0]}; only the "
             f"{writer.carries[0]} was written",
-            FbaWarning,
             stacklevel=2,
         )
 

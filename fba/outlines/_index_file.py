@@ -122,8 +122,7 @@ def read_index(path: str | os.PathLike[str], limits: Limits) -> Stored:
             if isinstance(error, FormatError):
                 raise
             raise FormatError(
-                f"is not an index of outlines, or is damaged ({error}); {REMEDY}",
-                path=path,
+                f"is not an index of outlines, or is damaged ({error}); {REMEDY}", path=path
             ) from error
     streams, views = about
     _check(arrays, len(streams), len(views), path)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
-from fba.arrays import Float64, Intp
-from fba.errors import FbaWarning, ModelError, OptionError
+from fba.arrays import Float64
+from fba.errors import ModelError, OptionError, warn
 from fba.persona._curves import measure_curves
 from fba.persona._observation import Neutral, Observation, observe
 from fba.persona._persona import SHARE_OF_WIDTH, PartStyle, Persona, part_width
@@ -51,20 +50,19 @@ def learn(
     ]
     still = np.asarray(np.mean([take.neutral for take in takes], axis=0))
     moved = np.concatenate([take.mask_motion(recogniser) for take in takes])
-    source = np.concatenate([np.full(len(take.rows), n) for n, take in enumerate(takes)])
-    frame = np.concatenate([take.rows for take in takes])
     rates = [float(face.rate) for face in faces]
-    parts = {part: _learn_part(part, takes, rates, moved, source, frame, still, recogniser) for part in PARTS}
+    parts = {part: _learn_part(part, takes, rates, moved, still, recogniser) for part in PARTS}
     if not _moves(moved):
         raise ModelError("the actor's face rests in all frames: there is no expression to learn")
     frames, turned = sum(map(len, faces)), sum(int(take.registered.turned.sum()) for take in takes)
     lost = sum(int((~face.tracked).sum()) for face in faces)
     if turned or lost:
-        warnings.warn(
+        warn(
             f"of {frames} frames, {lost} have no face, and in {turned} the head is turned by more than "
-            "30 degrees: they are left out", FbaWarning, stacklevel=2,
-        )  # fmt: skip
-    return Persona(name or faces[0].name, still, parts, frames, len(frame), turned, lost)
+            "30 degrees: they are left out",
+            stacklevel=2,
+        )
+    return Persona(name or faces[0].name, still, parts, frames, len(moved), turned, lost)
 
 
 def _moves(moved: Float64) -> bool:
@@ -81,13 +79,13 @@ def _learn_part(
     takes: list[Observation],
     rates: list[float],
     moved: Float64,
-    source: Intp,
-    frame: Intp,
     still: Float64,
     recogniser: ClassRecogniser,
 ) -> PartStyle:
     """Return the actor's style of a part. moved: (S, 86, 3), in all frames that are used."""
     component = recogniser.components[part]
+    source = np.concatenate([np.full(len(take.rows), n) for n, take in enumerate(takes)])
+    frame = np.concatenate([take.rows for take in takes])
     labels = Labels(
         np.concatenate([take.labels[part].first for take in takes]),
         np.concatenate([take.labels[part].second for take in takes]),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Bool, Float64, Intp
 from fba.choices import Means
-from fba.errors import FbaWarning, OptionError, did_you_mean
+from fba.errors import OptionError, did_you_mean, warn
 from fba.parameters import FAP_COUNT
 from fba.persona._curves import CurveMap, fit_curves, general_curves
 from fba.persona._observation import Neutral, Observation, observe
@@ -125,11 +124,11 @@ def usable_means(persona: Persona, means: Means) -> Means:
         )
     if means != "motion" or persona.motions is not None:
         return means
-    warnings.warn(
+    warn(
         f"the Persona of {persona.name or 'the actor'} has no statistics of motion, as its file is of "
         "version 1: amplitude, speed and sides stay the user's; learn it again to have them",
-        FbaWarning, stacklevel=3,
-    )  # fmt: skip
+        stacklevel=3,
+    )
     return "curves"
 
 

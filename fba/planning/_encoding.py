@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
 from numbers import Real
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.codec import EncoderOptions, EncoderStatistics, encode_animation
 from fba.encoder_options import PRESETS, REFERENCE, Preset
-from fba.errors import FbaWarning, OptionError, did_you_mean
+from fba.errors import OptionError, did_you_mean, warn
 from fba.face import FaceModel
 from fba.planning._near_lossless import encode_within_tolerance
 from fba.planning._plan import encode_planned
@@ -171,10 +170,9 @@ def _warn_of_clamped(statistics: EncoderStatistics) -> None:
             f"{name} ({one.count}; frame {one.frame}: {one.value} sent as {one.sent})" for name, one in most
         ]
         more = len(statistics.clamped_parameters) - len(names)
-        warnings.warn(
+        warn(
             f"values limited to what their ranges carry: {statistics.clamped}, of {', '.join(names)}"
             f"{f' and {more} parameters more' if more else ''}; a larger quantiser may carry them",
-            FbaWarning,
             stacklevel=3,
         )
 
@@ -221,10 +219,7 @@ def _options(options: EncoderOptions | None, given: dict[str, Any]) -> EncoderOp
 
 
 def _goal(
-    animation: Animation,
-    preset: Preset | None,
-    tolerance: float | Tolerance | None,
-    bit_rate: float | None,
+    animation: Animation, preset: Preset | None, tolerance: float | Tolerance | None, bit_rate: float | None
 ) -> Goal | None:
     """Return the goal that keywords of `encode` name; None for the preset of the options."""
     choices = {"preset": preset, "tolerance": tolerance, "bit_rate": bit_rate}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any, NamedTuple
@@ -12,7 +11,7 @@ import numpy as np
 from fba.animation import Animation, Frame, check_order
 from fba.arrays import Bool, Int64
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, levels, quantise, range_limit, step_scale
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.face import Resolver
 from fba.parameters import BAP_COUNT, FAP_COUNT, bap_angles, fill_from_mates
 from fba.planning._code_lengths import BEYOND_RANGES
@@ -183,10 +182,9 @@ class _FaceSource:
         added = self._sent & ~face.mask
         defines = face.viseme[0, 3] or face.expression[0, 5]
         if (added & (interpolated | bool(defines)))[:, 2:].any():
-            warnings.warn(
+            warn(
                 "the first viseme or expression of a live stream redefines itself, or comes while FAPs that "
                 "were sent are interpolated; what is shown may differ from here on",
-                FbaWarning,
                 stacklevel=6,
             )
         mask = self._sent & ~interpolated

@@ -90,11 +90,7 @@ def encode_within_tolerance(
 
 
 def _encode_face(
-    animation: Animation,
-    tolerance: Tolerance,
-    options: EncoderOptions,
-    model: FaceModel,
-    every_frame: bool,
+    animation: Animation, tolerance: Tolerance, options: EncoderOptions, model: FaceModel, every_frame: bool
 ) -> tuple[bytes, NearLossless]:
     """Return a stream whose face stays within a tolerance, and its errors; a body is sent as it is."""
     source = _Source(animation, model, options, every_frame)

@@ -12,7 +12,6 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from fba.errors import FbaError
@@ -102,9 +101,7 @@ class Server:
         ready.wait()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
         self._close_code = GOING_AWAY if kind is not None or self._stopped.is_set() else NORMAL
         self._stopped.set()
         self._loop.call_soon_threadsafe(self._closing.set)

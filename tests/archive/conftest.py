@@ -1,7 +1,5 @@
 """An archive of four performances, made once."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

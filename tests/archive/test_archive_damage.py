@@ -1,7 +1,5 @@
 """Archives that are damaged, foreign, contradictory or huge, and disks that are full: a clear error each."""
 
-from __future__ import annotations
-
 import errno
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Archives that lie elsewhere, opened by fsspec: in its memory, in a folder by address, in a ZIP file."""
 
-from __future__ import annotations
-
 import pickle
 import shutil
 import sys
@@ -18,15 +16,7 @@ pytest.importorskip("duckdb")
 import fsspec
 
 import archived
-from fba.archive import (
-    Archive,
-    Windows,
-    describe_archive,
-    extract,
-    index_archive,
-    query,
-    verify_archive,
-)
+from fba.archive import Archive, Windows, describe_archive, extract, index_archive, query, verify_archive
 from fba.errors import FbaError, FormatError, OptionError
 
 ADDRESS = "memory://elsewhere/archive"

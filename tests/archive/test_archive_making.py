@@ -1,7 +1,5 @@
 """Archives: what their rows hold, plain readers, adding to them, interruptions, labels and sounds."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -69,7 +67,6 @@ def test_any_parquet_reader_reads_them(takes: Path, archive: Path) -> None:
             decoder = fba.Decoder(bap_steps=row["bap_steps"])
             first = (decoder.push(b"\0\0\1\xba" + row["stream"][byte:]))[0]
             if animation.face is not None:
-                assert first.face is not None
                 np.testing.assert_array_equal(first.face.values[0], animation.face.values[frame])
     assert [row["name"] for row in rows] == sorted(archived.NAMES)
 
@@ -137,7 +134,6 @@ def test_a_make_that_is_killed_leaves_whole_shards(takes: Path, tmp_path: Path) 
     )
     command = [sys.executable, "-c", script, str(takes), str(tmp_path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         assert [process.stdout.readline().strip() for _ in range(2)] == list(archived.NAMES[:2])
         os.kill(process.pid, signal.SIGKILL)
     assert [check.faults for check in verify_archive(tmp_path)] == [()] * 2

@@ -1,7 +1,5 @@
 """The index of an archive: figures against counts by hand; queries, and text that must do no harm."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

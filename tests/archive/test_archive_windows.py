@@ -1,7 +1,5 @@
 """`fba.archive.Windows`: equal to whole performances converted, in processes, and by its options."""
 
-from __future__ import annotations
-
 import multiprocessing
 import pickle
 from pathlib import Path

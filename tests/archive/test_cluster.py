@@ -1,7 +1,5 @@
 """`fba convert --batch --scheduler` on a cluster of dask: workers that are killed, a scheduler that ends."""
 
-from __future__ import annotations
-
 import csv
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Sound in one channel at a rate: as FFmpeg reads it, and WAV files by the standard library alone."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import wave

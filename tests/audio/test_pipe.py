@@ -1,7 +1,5 @@
 """Sound through pipes: headers that lie, all kinds of samples, pieces of any size, ends anywhere."""
 
-from __future__ import annotations
-
 import io
 import struct
 

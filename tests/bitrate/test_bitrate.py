@@ -1,7 +1,5 @@
 """The study on a short sample: its rows, its files, its page; and what it says about bad input."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -91,7 +89,6 @@ def test_rates_are_of_whole_streams_and_of_whole_packets(
     assert live.file_rate == pytest.approx(len(data) * 8 / 480)
     assert live.live_bytes is not None
     bits = fba.probe(data).plane_bits
-    assert bits is not None
     assert 0 <= 8 * live.live_bytes - bits.sum() < 8 * 12
     assert live.header_rate == pytest.approx(8.0)  # 40 bytes, 25 times a second
 

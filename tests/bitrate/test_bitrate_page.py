@@ -1,7 +1,5 @@
 """The page of bit rates and the README's table show the numbers in bench/results, which fit each other."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 
@@ -24,8 +22,6 @@ def results() -> dict[str, list[Result]]:
 def test_the_page_is_made_of_the_results() -> None:
     script = ROOT / "docs" / "make_bitrate_page.py"
     spec = importlib.util.spec_from_file_location("make_bitrate_page", script)
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     shown = (ROOT / "docs" / "bitrate.md").read_text(encoding="utf-8")

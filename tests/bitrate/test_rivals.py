@@ -1,7 +1,5 @@
 """What other compressors take: bytes that their own decoders turn back into the numbers."""
 
-from __future__ import annotations
-
 import zlib
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of the study: worked out by hand for poses that are simple."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

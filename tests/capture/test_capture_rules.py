@@ -1,7 +1,5 @@
 """Decision constants and rules of capture: each has a test here that dies with it."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -142,7 +140,6 @@ def test_on_tiptoe_the_tip_of_the_toes_is_lowest() -> None:
     joints = ("ankle", "subtalar", "midtarsal", "metatarsal")
     root = skeleton.centres[:1]
     found = soles.body_soles(skeleton, {f"l_{joint}": down for joint in joints}, root)
-    assert found is not None
     ankle, ball = (skeleton.centres[skeleton.number(name)] for name in ("l_ankle", "l_metatarsal"))
     assert found.lowest[0] == pytest.approx(ankle[1] - (ball[2] - ankle[2]) - 0.0745)
     assert found.points[1, 0, 0] == pytest.approx(  # the right heel, flat on the ground
@@ -167,26 +164,31 @@ def test_legs_move_feet_that_are_on_the_ground(height: float, lacking: float, mo
     np.testing.assert_allclose(soles.heights(above, above - lacking, 60.0), move, atol=1e-4)
 
 
+DOWN, ACROSS = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+
+
+def knee_angles(bends: np.ndarray, turn: float = 0.0) -> np.ndarray:
+    """Angles (T, 2) that are found for a knee that bends by `bends`. turn: of the thigh about itself."""
+    knee = hinges.Hinge(DOWN, DOWN, ACROSS, DOWN, 1.0)
+    local = (Rotation.from_rotvec(turn * DOWN) * Rotation.from_rotvec(np.outer(bends, ACROSS))).as_matrix()
+    return hinges.solve(knee, local @ DOWN, local, 25.0)
+
+
 def test_a_clear_bend_shows_which_way_a_knee_bends() -> None:
     """Most of the time it is a little beyond straight, by noise; 0.35 rad in the end is clear enough."""
-    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-    knee = hinges.Hinge(down, down, across, down, 1.0)
     bends = np.concatenate([np.full(400, -0.05), np.linspace(-0.05, 0.35, 10), np.full(8, 0.35)])
-    turn = Rotation.from_rotvec(2.0 * down)  # of the thigh about itself, in the source
-    local = (turn * Rotation.from_rotvec(np.outer(bends, across))).as_matrix()
-    angles = hinges.solve(knee, local @ down, local, 25.0)
+    angles = knee_angles(bends, turn=2.0)
     np.testing.assert_allclose(angles[:, 0], 2.0, atol=0.03)
     np.testing.assert_allclose(angles[:, 1], bends, atol=0.03)
 
 
 def test_an_upper_arm_does_not_flip_where_a_straight_arm_is_jerked() -> None:
     """The forearm is bent by 0.2 rad, in one plane and, a 60th of a second later, in another one."""
-    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-    elbow = hinges.Hinge(down, down, across, down, 1.0)
+    elbow = hinges.Hinge(DOWN, DOWN, ACROSS, DOWN, 1.0)
     plane = np.where(np.arange(120) < 60, 0.0, 1.4)
-    axes = Rotation.from_rotvec(plane[:, None] * down).apply(across)
+    axes = Rotation.from_rotvec(plane[:, None] * DOWN).apply(ACROSS)
     local = Rotation.from_rotvec(0.2 * axes).as_matrix()
-    angles = hinges.solve(elbow, local @ down, local, 60.0)
+    angles = hinges.solve(elbow, local @ DOWN, local, 60.0)
     assert np.abs(np.diff(angles[:, 0])).max() < 0.8
     np.testing.assert_allclose(angles[[0, -1], 0], [0.0, 1.4], atol=0.1)
 
@@ -217,28 +219,19 @@ def test_feet_far_from_a_slope_count_little() -> None:
 
 @pytest.mark.parametrize("bend", [-0.15, -0.25])
 def test_a_knee_that_is_overstretched_all_the_time_is_not_turned_round(bend: float) -> None:
-    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-    knee = hinges.Hinge(down, down, across, down, 1.0)
-    local = Rotation.from_rotvec(np.outer(np.full(60, bend), across)).as_matrix()
-    angles = hinges.solve(knee, local @ down, local, 25.0)
+    angles = knee_angles(np.full(60, bend))
     np.testing.assert_allclose(angles[:, 0], 0.0, atol=0.01)
     np.testing.assert_allclose(angles[:, 1], bend, atol=0.01)
 
 
 def test_a_knee_that_is_clearly_bent_backwards_is_turned_round() -> None:
-    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-    knee = hinges.Hinge(down, down, across, down, 1.0)
-    local = Rotation.from_rotvec(np.outer(np.full(60, -0.5), across)).as_matrix()
-    angles = hinges.solve(knee, local @ down, local, 25.0)
+    angles = knee_angles(np.full(60, -0.5))
     np.testing.assert_allclose(np.abs(angles[:, 0]), np.pi, atol=0.02)
     np.testing.assert_allclose(angles[:, 1], 0.5, atol=0.02)
 
 
 def test_a_knee_that_bends_back_far_and_long_turns_round_after_all() -> None:
-    down, across = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-    knee = hinges.Hinge(down, down, across, down, 1.0)
     bends = np.concatenate([np.full(900, 0.5), np.linspace(0.5, -0.6, 25), np.full(750, -0.6)])
-    local = Rotation.from_rotvec(np.outer(bends, across)).as_matrix()
-    angles = hinges.solve(knee, local @ down, local, 25.0)
+    angles = knee_angles(bends)
     np.testing.assert_allclose(np.cos(angles[[0, -1], 0]), [1.0, -1.0], atol=0.001)
     np.testing.assert_allclose(angles[[0, -1], 1], [0.5, 0.6], atol=0.02)

@@ -1,7 +1,5 @@
 """Retargeting without machine code: the same BAPs, slower."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -39,7 +37,6 @@ def test_the_same_baps_without_machine_code() -> None:
     compiled, values = json.loads(done.stdout)
     assert compiled is False
     body = from_skeleton(swinging_limbs()).body
-    assert body is not None
     np.testing.assert_allclose(values, body.values, atol=1)  # machine code may round differently
 
 

@@ -3,8 +3,6 @@
 `python -m tools.captures measure` does the same at length.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -111,8 +109,6 @@ def test_shapes_of_recordings(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 def test_truth_of_a_take(take: Take) -> None:
     truth = as_animation(take)
-    assert truth.face is not None
-    assert truth.body is not None
     np.testing.assert_allclose(truth.face.values, take.faps, atol=0.5)
     np.testing.assert_allclose(truth.body.values[:, 180], 1000 * take.path[:, 1], atol=0.5)
 

@@ -1,7 +1,5 @@
 """A capture beside its result: each measure sees its fault, and says how large it is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -49,7 +47,6 @@ def result(source: SkeletonMotion) -> Animation:
 
 def changed(result: Animation, name: str, value: float, frames: slice = slice(None)) -> Animation:
     """The result with a BAP that is larger by a value, degrees or mm, in some frames."""
-    assert result.body is not None
     values = result.body.values.copy()
     amount = value if "_tr_" in name else np.radians(value) * 1e5
     values[frames, bap_numbers()[name] - 1] += round(amount)

@@ -1,7 +1,5 @@
 """Limbs that are almost straight do not spin about themselves: no jumps that the source does not make."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

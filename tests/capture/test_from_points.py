@@ -1,7 +1,5 @@
 """Tracked points of faces whose FAPs are known: these come back from other heads, and from damaged tracks."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from functools import cache

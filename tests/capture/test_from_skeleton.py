@@ -1,7 +1,5 @@
 """Captured skeletons become BAPs whose bones point where the source's bones point."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -293,7 +291,7 @@ def test_forward_kinematics_against_scipy() -> None:
 
 
 GROUNDED = {
-    "greta/c-ladder.bvh": 0.3,  # climbs
+    "greta/c-ladder.bvh": 0.3  # climbs
 }
 """Least share of frames in which the shown person's soles are within 5 mm of the ground; others: 0.95."""
 STANCE = 0.85
@@ -303,7 +301,6 @@ others are of a straight leg behind, whose foot is about to leave, or has just c
 
 def standing_soles(captured: SkeletonMotion, mapped: dict[str, int], animation: Animation) -> np.ndarray:
     """Heights in metres of the shown person's soles, of each foot while the source's stands."""
-    assert animation.body is not None
     solver, rate = BapSolver(), float(captured.rate)
     up = find_up(captured, mapped)
     neutral = result_figure(solver, np.zeros((1, 296), dtype=np.int32))
@@ -340,7 +337,6 @@ def test_real_captures_keep_every_bone(shared: Path, name: str) -> None:
     # the balls of the feet reach the ground; those of people who sit on the edges of their shoes are above it
     assert abs(np.percentile(low, 5) - 0.0092) < (0.011 if "gesture" in name else 0.006)
     assert low.min() > -0.045
-    assert report.feet is not None
     assert report.feet.mean < 0.005
     assert report.feet.worst < 0.0125
     assert report.feet.within > 0.985

@@ -1,7 +1,5 @@
 """Maps of joints in Python: found, changed by hand, saved and read again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

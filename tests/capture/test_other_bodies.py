@@ -1,7 +1,5 @@
 """Bodies that lack joints, sources of few joints, and other orders of the axes, by geometry."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -54,13 +52,11 @@ def part_of(captured: SkeletonMotion, *names: str) -> SkeletonMotion:
 
 
 def value(animation: Animation, name: str) -> np.ndarray:
-    assert animation.body is not None
     return animation.body.values[:, NUMBERS[name] - 1]
 
 
 @pytest.mark.parametrize(
-    "missing",
-    ["acromioclavicular", "skullbase", "subtalar", "metatarsal midtarsal", "vl2 vl3 vl4"],
+    "missing", ["acromioclavicular", "skullbase", "subtalar", "metatarsal midtarsal", "vl2 vl3 vl4"]
 )
 def test_a_body_without_some_joints_still_points_every_bone(missing: str) -> None:
     solver = body_without(*missing.split())
@@ -184,12 +180,10 @@ def test_a_report_of_given_joints() -> None:
 def test_a_report_counts_feet_within_a_centimetre() -> None:
     captured = motion("standing", 20)
     animation = from_skeleton(captured)
-    assert animation.body is not None
     for millimetres, within in ((8, 1.0), (12, 0.75)):
         values = animation.body.values.copy()
         values[::4, NUMBERS["HumanoidRoot_tr_vertical"] - 1] += millimetres
         report = retarget_report(captured, replace(animation, body=replace(animation.body, values=values)))
-        assert report.feet is not None
         assert report.feet.within == within
         assert report.feet.worst == pytest.approx(millimetres / 1000, abs=0.001)
 

@@ -1,7 +1,5 @@
 """Feet on the ground: heights, slip, slopes, and what that costs the legs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -130,7 +128,6 @@ def test_sloping_ground_is_levelled(rise: float) -> None:
     low = np.minimum(kept["l_metatarsal"], kept["r_metatarsal"])[:, 1]
     assert low[-60:].mean() - low[:60].mean() == pytest.approx(rise * 3.5 * 0.9566, abs=0.015)
     report = retarget_report(captured, from_skeleton(captured))
-    assert report.feet is not None
     assert report.feet.within > 0.99
 
 
@@ -205,7 +202,6 @@ def test_a_foot_in_the_air_is_never_under_the_ground() -> None:
     captured = motion("standing", count, turns={"RightUpLeg": swing, "RightFoot": down})
     values = from_skeleton(captured).body.values  # type: ignore[union-attr]
     lowest = lowest_sole(Skeleton.default(), BapSolver().pose(values))
-    assert lowest is not None
     assert lowest.min() > -0.004
 
 
@@ -281,7 +277,6 @@ def test_soles_are_those_of_the_person_that_is_shown() -> None:
     turned = {"l_hip": bent.swapaxes(1, 2), "l_knee": np.eye(3)[None], "l_ankle": np.eye(3)[None]}
     root = skeleton.centres[:1]
     found = soles.body_soles(skeleton, turned, root)
-    assert found is not None
     apart = []
     for body in (skeleton, shown):
         thigh = body.centres[body.number("l_knee")] - body.centres[body.number("l_hip")]

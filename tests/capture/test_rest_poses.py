@@ -1,7 +1,5 @@
 """What is found out about a capture before it is retargeted: bones, the way up, the rest pose."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """What becomes of spines, clavicles, forearms, fingers and feet; families of names; the report."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -150,7 +148,6 @@ def test_feet_follow_the_ground_and_leaps() -> None:
         assert abs(ball[:15] - 0.0092 - floor).max() < 0.01
         assert ball[30] - ball[0] == pytest.approx(0.3 * scale, abs=0.01)
     report = retarget_report(captured, from_skeleton(captured))
-    assert report.feet is not None
     assert report.feet.ground == pytest.approx(-0.02 * scale, abs=1e-3)
     assert report.feet.worst < 0.01
     assert report.feet.within == 1

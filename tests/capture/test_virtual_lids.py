@@ -1,7 +1,5 @@
 """Virtual markers of lids, which move rows, and eyes that look at the camera."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -57,7 +55,6 @@ def test_rows_of_lids_are_those_of_the_source(middle: str, rows: tuple[float, ..
     assert (found.vertices[0], found.shares[0]) == (start, 1.0)
     side = f"left {'upper' if middle == UPPER else 'lower'} lid"
     landmarks = head().landmarks
-    assert landmarks is not None
     margin = landmarks.contour(side)
     away = np.linalg.norm(places[found.vertices][:, None] - places[margin], axis=2)
     central = away.argmin(axis=1) == np.flatnonzero(margin == start)[0]  # the Gaussian is 1 there, nearly
@@ -70,7 +67,6 @@ def test_rows_of_lids_are_those_of_the_source(middle: str, rows: tuple[float, ..
 def test_a_lid_moves_less_towards_its_corners_as_a_gaussian() -> None:
     found = find_rows(head(), bound(UPPER), 0.006)
     landmarks = head().landmarks
-    assert landmarks is not None
     margin = landmarks.contour("left upper lid")
     shares = dict(zip(found.vertices.tolist(), found.shares.tolist(), strict=True))
     way = np.cumsum(np.linalg.norm(np.diff(head().skin.vertices[margin], axis=0, prepend=0), axis=1))

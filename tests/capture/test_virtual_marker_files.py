@@ -1,7 +1,5 @@
 """TOML files of virtual markers: what is written is read, and what is wrong in one is named."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

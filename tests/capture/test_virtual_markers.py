@@ -1,7 +1,5 @@
 """Virtual markers: the walk over the mesh, weights, and a head that moves as its markers do."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """MP4 files of other programs, in all forms of their boxes, and damaged, contradictory and hostile ones."""
 
-from __future__ import annotations
-
 import re
 import struct
 from pathlib import Path

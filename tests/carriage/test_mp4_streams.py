@@ -1,7 +1,5 @@
 """MP4 files with a stream: what is written is read as the same, at exact times, with and without sound."""
 
-from __future__ import annotations
-
 import struct
 import warnings
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ In each, samples have the same bytes and the same sync flags. Those that are not
 is a system package (`./dev system ffmpeg`), mp4box.js comes with `./dev web`, the others with `./dev setup`.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

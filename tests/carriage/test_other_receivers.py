@@ -1,7 +1,5 @@
 """Packets as other programs read them: tshark dissects each, FFmpeg takes the planes out of RFC 6416."""
 
-from __future__ import annotations
-
 import shutil
 import socket
 import struct

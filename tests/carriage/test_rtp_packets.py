@@ -1,7 +1,5 @@
 """RTP packets and their payloads, bit by bit; hostile ones are refused."""
 
-from __future__ import annotations
-
 import contextlib
 import random
 

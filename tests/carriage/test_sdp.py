@@ -1,7 +1,5 @@
 """Descriptions of sessions: written, read, and refused with the line that is wrong."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

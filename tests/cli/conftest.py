@@ -1,33 +1,26 @@
 """The command line as a function: arguments in, exit code and output out."""
 
-from __future__ import annotations
-
 import warnings
-from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
+from command_line import Ended, Run
 from fba import Animation, BodyTrack, FaceTrack
 from fba.cli.main import main
 
 
-class Run(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Run]:
-    def call(*arguments: object) -> Run:
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    def call(*arguments: object, code: int | None = 0) -> Ended:
         capsys.readouterr()
         with warnings.catch_warnings(), pytest.raises(SystemExit) as stop:
             main([str(one) for one in arguments])
         output = capsys.readouterr()
-        return Run(int(stop.value.code or 0), output.out, output.err)
+        ended = Ended(int(stop.value.code or 0), output.out, output.err)
+        assert code in (None, ended.code), ended
+        return ended
 
     return call
 

@@ -1,7 +1,5 @@
 """`fba demo`: what it leaves behind. Drawing is left out here: .ci/run makes the whole film."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,25 +1,20 @@
 """Exit codes, one-line errors, help."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import fba
+from command_line import Run
 from fba import Animation
 from fba.cli.main import _COMMANDS
 
-Run = Callable[..., tuple[int, str, str]]
-
 
 def test_help_lists_every_command_with_examples(run: Run) -> None:
-    code, out, _ = run("--help")
-    assert code == 0
+    out = run("--help").out
     assert "Examples:" in out
     for name in _COMMANDS:
         assert f"\n  {name} " in out
@@ -27,8 +22,7 @@ def test_help_lists_every_command_with_examples(run: Run) -> None:
 
 @pytest.mark.parametrize("name", _COMMANDS)
 def test_help_of_every_command(run: Run, name: str) -> None:
-    code, out, _ = run(name, "--help")
-    assert code == 0
+    out = run(name, "--help").out
     assert out.startswith(f"Usage: fba {name}")
     assert f"fba {name}" in out.split("Examples:")[1]
     assert "--debug" in out
@@ -49,8 +43,7 @@ def test_version(run: Run) -> None:
     ],
 )
 def test_bad_usage_exits_with_2(run: Run, arguments: list[str]) -> None:
-    code, out, err = run(*arguments)
-    assert code == 2
+    _, out, err = run(*arguments, code=2)
     assert out == ""
     assert "Error" in err
 
@@ -58,8 +51,7 @@ def test_bad_usage_exits_with_2(run: Run, arguments: list[str]) -> None:
 def test_bad_data_is_one_line_and_exit_1(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "broken.fba"
     path.write_bytes(b"\x00\x00\x01\xba\xff")
-    code, _, err = run("decode", path, "--fap", tmp_path / "out.fap")
-    assert code == 1
+    err = run("decode", path, "--fap", tmp_path / "out.fap", code=1).err
     assert err.startswith("fba: error: ")
     assert err.count("\n") == 1
     assert "ends inside this plane" in err
@@ -76,9 +68,7 @@ def test_debug_shows_the_traceback(run: Run, tmp_path: Path) -> None:
 
 
 def test_a_directory_is_no_file(run: Run, tmp_path: Path) -> None:
-    code, _, err = run("info", tmp_path)
-    assert code == 2
-    assert "directory" in err
+    assert "directory" in run("info", tmp_path, code=2).err
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes of a POSIX shell")

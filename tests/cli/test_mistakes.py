@@ -1,12 +1,7 @@
 """Mistakes of users: what the program then says names options that exist, and files that are meant."""
 
-from __future__ import annotations
-
-import io
 import json
 import re
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -14,12 +9,12 @@ import numpy as np
 import pytest
 
 import fba
+from command_line import Run, pipe_in
 from fba import Animation
 from fba.cli.main import _COMMANDS, group
 from fba.errors import FormatError, Remedy
 from small_people import BONES, write_person
 
-Run = Callable[..., tuple[int, str, str]]
 SAMPLE = Path(fba.__file__).parent / "samples" / "hello.bvh"
 
 
@@ -62,10 +57,8 @@ def test_a_rate_can_be_given_wherever_one_is_asked_for(
     words = [word.format(file=headless, out=tmp_path / "out") for word in command]
     if str(headless) not in words:
         words.append(str(headless))
-    code, _, err = run(*words)
-    assert code == 1
-    assert err.endswith("its frame rate is unknown; give one with --source-fps 25\n")
-    code, _, err = run(*words, "--source-fps", "25")
+    assert run(*words, code=1).err.endswith("its frame rate is unknown; give one with --source-fps 25\n")
+    code, _, err = run(*words, "--source-fps", "25", code=None)
     if command[0] == "gait":
         assert "has no body" in err  # it was read
     else:
@@ -86,23 +79,18 @@ def test_the_nearest_name_of_a_missing_file_is_given(
     run: Run, headless: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
     monkeypatch.chdir(headless.parent)
-    code, _, err = run(*command)
-    assert code == 2
-    assert "does not exist (did you mean 'headless.fap'?)" in err
+    assert "does not exist (did you mean 'headless.fap'?)" in run(*command, code=2).err
 
 
 def test_a_program_that_does_not_exist_is_one_message(run: Run) -> None:
-    code, out, err = run("conformance", "--decoder", "no-such-decoder {in} {out}")
-    assert (code, out) == (2, "")
+    _, out, err = run("conformance", "--decoder", "no-such-decoder {in} {out}", code=2)
+    assert out == ""
     assert "there is no program 'no-such-decoder' here; give its path, or a name on PATH" in err
 
 
 def test_info_has_the_salvage_that_it_names(run: Run, cut: Path) -> None:
-    code, _, err = run("info", cut)
-    assert code == 1
-    assert err.endswith("; --salvage reads the frames before it\n")
-    code, out, err = run("info", cut, "--salvage")
-    assert code == 0
+    assert run("info", cut, code=1).err.endswith("; --salvage reads the frames before it\n")
+    _, out, err = run("info", cut, "--salvage")
     assert "49 frames" in out
     assert "salvaged the 49 frames" in err
     assert "--salvage" not in err
@@ -112,15 +100,13 @@ def test_an_option_of_another_command_is_named_with_it(run: Run, tmp_path: Path)
     values, mask = np.zeros((1, 68), dtype=np.int32), np.zeros((1, 68), dtype=bool)
     values[0, 13], mask[0, 13] = 2000, True
     fba.write(tmp_path / "wild.fap", Animation(25, np.arange(1), fba.FaceTrack(values, mask)))
-    code, _, err = run("convert", tmp_path / "wild.fap", tmp_path / "wild.fba")
-    assert code == 1
+    err = run("convert", tmp_path / "wild.fap", tmp_path / "wild.fba", code=1).err
     assert err.endswith("or send the nearest value that fits with --clamp of `fba encode`\n")
 
 
 def test_joints_that_names_do_not_tell_can_be_given(run: Run, bvh: Path, tmp_path: Path) -> None:
     bvh.write_text(re.sub(r"(ROOT|JOINT) (\w+)", lambda m: f"{m[1]} part{m.start()}", bvh.read_text()))
-    code, _, err = run("info", bvh)
-    assert code == 1
+    err = run("info", bvh, code=1).err
     assert err.endswith(
         "name each joint's counterpart in the standard with --map Pelvis=HumanoidRoot of `fba encode`\n"
     )
@@ -129,20 +115,16 @@ def test_joints_that_names_do_not_tell_can_be_given(run: Run, bvh: Path, tmp_pat
     joints = ["HumanoidRoot", *(f"{s}_{e}" for s in "lr" for e in ends), "vl5", "vc4", "skullbase"]
     animation = fba.read(bvh, joints=dict(zip(names, joints, strict=True)))
     assert len(animation) == 3
-    assert animation.body is not None
     assert animation.body.mask.any()
     pairs = [word for name, joint in zip(names, joints, strict=True) for word in ("--map", f"{name}={joint}")]
-    assert run("convert", bvh, tmp_path / "out.bap", *pairs)[0] == 0
-    written = fba.read(tmp_path / "out.bap").body
-    assert written is not None
-    assert np.array_equal(written.values, animation.body.values)
+    run("convert", bvh, tmp_path / "out.bap", *pairs)
+    assert np.array_equal(fba.read(tmp_path / "out.bap").body.values, animation.body.values)
 
 
 def test_joints_of_a_body_are_given_as_options(run: Run, tmp_path: Path, face: Animation) -> None:
     path = write_person(tmp_path / "p.glb", names={bone: f"n{k}" for k, bone in enumerate(BONES)})
     fba.write(tmp_path / "a.fap", face)
-    code, _, err = run("render", tmp_path / "a.fap", "-o", tmp_path / "a.png", "--body", path)
-    assert code == 1
+    err = run("render", tmp_path / "a.fap", "-o", tmp_path / "a.png", "--body", path, code=1).err
     assert err.endswith("name each joint's counterpart in the standard with --map Pelvis=HumanoidRoot\n")
 
 
@@ -167,39 +149,30 @@ def test_remedies_name_options_of_other_commands(run: Run, tmp_path: Path) -> No
         f"}} }}\nMOTION\nFrames: 1\nFrame Time: 0.04\n{' '.join(['5'] * 15)}\n"
     )
     maps = [word for pair in joints.items() for word in ("--map", "=".join(pair))]
-    code, _, err = run("convert", path, tmp_path / "a.bap", *maps)
+    err = run("convert", path, tmp_path / "a.bap", *maps).err
     assert "give another, in metres, with --scale 0.001 of `fba encode`\n" in err
-    assert code == 0
 
 
 def test_a_format_can_be_named(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "walk.txt"
     path.write_text("\n" + " " * 70_000 + "\n" + SAMPLE.read_text())
-    code, _, err = run("info", path)
-    assert code == 1
-    assert err.endswith("; if it is one of them, name it with --from bvh\n")
-    code, out, _ = run("info", path, "--from", "bvh")
-    assert code == 0
-    assert f"{path}: BVH" in out
-    code, _, err = run("info", path, "--from", "bhv")
-    assert code == 2
-    assert "there is no format 'bhv' (did you mean 'bvh'?)" in err
-    code, _, err = run("convert", SAMPLE, tmp_path / "walk.xyz")
-    assert code == 1
-    assert "or name it with --to fba" in err
+    assert run("info", path, code=1).err.endswith("; if it is one of them, name it with --from bvh\n")
+    assert f"{path}: BVH" in run("info", path, "--from", "bvh").out
+    assert "there is no format 'bhv' (did you mean 'bvh'?)" in run("info", path, "--from", "bhv", code=2).err
+    assert "or name it with --to fba" in run("convert", SAMPLE, tmp_path / "walk.xyz", code=1).err
 
 
 def test_convert_names_the_version_that_it_writes(run: Run, tmp_path: Path, face: Animation) -> None:
     fba.write(tmp_path / "a.fba", face)
-    code, out, _ = run("convert", tmp_path / "a.fba", tmp_path / "a.fap")
-    assert (code, out) == (0, f"{tmp_path}/a.fap: 50 frames, ASCII face animation parameters, version 2.2\n")
+    assert (
+        run("convert", tmp_path / "a.fba", tmp_path / "a.fap").out
+        == f"{tmp_path}/a.fap: 50 frames, ASCII face animation parameters, version 2.2\n"
+    )
 
 
 def test_a_misspelt_command(run: Run) -> None:
-    code, _, err = run("encdoe", "walk.bvh")
-    assert code == 2
-    assert "there is no command 'encdoe' (did you mean 'encode'?)" in err
-    assert "there is no command 'xyz'\n" in run("xyz")[2]
+    assert "there is no command 'encdoe' (did you mean 'encode'?)" in run("encdoe", "walk.bvh", code=2).err
+    assert "there is no command 'xyz'\n" in run("xyz", code=2).err
 
 
 def test_remedies_in_the_words_of_python(headless: Path, tmp_path: Path) -> None:
@@ -238,7 +211,6 @@ def test_options_for_arguments_exist() -> None:
 
 
 def _params(command: click.Command | None) -> list[click.Parameter]:
-    assert command is not None
     found = list(command.params)
     for each in getattr(command, "commands", {}).values():
         found += _params(each)
@@ -251,19 +223,17 @@ def test_one_bad_file_of_several_is_named_and_the_others_go_on(
 ) -> None:
     streams[1].write_bytes(b"\0\0\1\xba\xff")
     more = {"bench": ["--rounds", "1"], "decode": ["--fap", str(tmp_path)]}.get(command, [])
-    code, out, err = run(command, *streams, *more)
-    assert code == 1
+    _, out, err = run(command, *streams, *more, code=1)
     assert err.startswith(f"fba: error: {streams[1]}: ")
     assert err.count("two.fba") == 1
     assert err.count("\n") == 1
     assert out.count("one.fba") == out.count("three.fba") == 1
     if command == "decode":
         assert sorted(path.name for path in tmp_path.glob("*.fap")) == ["one.fap", "three.fap"]
-    code, out, _ = run(command, *streams, *more, "--json")
-    assert code == 1
+    out = run(command, *streams, *more, "--json", code=1).out
     assert [Path(row.get("file") or row["input"]).name for row in json.loads(out)] == ["one.fba", "three.fba"]
-    code, out, err = run(command, streams[1], *more)
-    assert (code, out) == (1, "")
+    _, out, err = run(command, streams[1], *more, code=1)
+    assert out == ""
     assert err.startswith(f"fba: error: {streams[1]}: ")
     assert err.count("two.fba") == 1
 
@@ -274,8 +244,7 @@ def test_a_row_of_stats_for_a_program_is_one_line_however_long_the_name(
     folder = tmp_path / ("long " * 40)
     folder.mkdir()
     (folder / "deep.fba").write_bytes(streams[0].read_bytes())
-    code, out, _ = run("stats", folder / "deep.fba", streams[2])
-    assert code == 0
+    out = run("stats", folder / "deep.fba", streams[2]).out
     rows = out.splitlines()
     assert len(rows) == 3
     assert rows[1].startswith(f"{folder / 'deep.fba'} ")
@@ -287,24 +256,17 @@ def test_errors_about_other_files_name_their_format(
     run: Run, tmp_path: Path, streams: list[Path], command: str
 ) -> None:
     more = ["--fap", str(tmp_path)] if command == "decode" else []
-    code, _, err = run(*command.split(), streams[1], *more)
-    assert code == 1
+    err = run(*command.split(), streams[1], *more, code=1).err
     assert err.startswith(f"fba: error: {streams[1]}: ")
     assert "it seems to be BVH motion capture" in err
 
 
 def test_standard_input_is_called_so(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    class Stdin:
-        buffer = io.BytesIO()
-
-    monkeypatch.setattr(sys, "stdin", Stdin)
-    code, _, err = run("encode", "-", "-o", tmp_path / "x.fba")
-    assert code == 1
+    pipe_in(monkeypatch, b"")
+    err = run("encode", "-", "-o", tmp_path / "x.fba", code=1).err
     assert err == "fba: error: standard input: is empty (0 bytes); was it fully copied or written?\n"
-    Stdin.buffer = io.BytesIO(b"2.2 a 25 9\n" + b"1 " * 68 + b"\n")
-    code, _, err = run("info", "-")
-    assert code == 1
-    assert err.startswith("fba: error: standard input:2: the last frame is cut")
+    pipe_in(monkeypatch, b"2.2 a 25 9\n" + b"1 " * 68 + b"\n")
+    assert run("info", "-", code=1).err.startswith("fba: error: standard input:2: the last frame is cut")
 
 
 @pytest.mark.parametrize(
@@ -322,8 +284,7 @@ def test_standard_input_is_called_so(run: Run, monkeypatch: pytest.MonkeyPatch, 
     ],
 )
 def test_rates_out_of_reach(run: Run, tmp_path: Path, rate: str, text: str) -> None:
-    code, _, err = run("convert", SAMPLE, tmp_path / "a.bap", "--fps", rate)
-    assert code == 2
+    err = run("convert", SAMPLE, tmp_path / "a.bap", "--fps", rate, code=2).err
     assert text in err
     assert "may be 1/3600 to 10000" in err
 
@@ -362,7 +323,5 @@ def test_times_outside_the_animation(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     fba.write("face.fap", face)
-    ended, _, err = run("render", "face.fap", *arguments)
-    assert ended == code
-    assert text in err
+    assert text in run("render", "face.fap", *arguments, code=code).err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["face.fap"]

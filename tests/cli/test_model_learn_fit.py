@@ -1,9 +1,6 @@
 """`fba model learn-fit`: what it prints and writes, and how it fails."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,12 +8,12 @@ import numpy as np
 import pytest
 
 import fba
+from command_line import Run
 from fba import Animation, FaceTrack
 from fba.face import FaceModel, InterpolationTable, resolve
 from fba.face.learning import send_sources
 from small_face import small_face
 
-Run = Callable[..., tuple[int, str, str]]
 JAW, CHIN, CORNER, LIP = 2, 17, 5, 3
 
 
@@ -36,11 +33,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_table_is_learned_stored_and_written(run: Run, here: Path) -> None:
-    code, out, err = run(
+    _, out, err = run(
         "model", "learn-fit", "monday.fap", "tuesday.fap", "--faps", 3, "--model", "head.glb",
         "-o", "ada.glb", "--fit", "ada.json",
     )  # fmt: skip
-    assert code == 0
     assert "the model does not show FAP 4 lower_t_midlip, 6 stretch_l_cornerlip, 18 depress_chin" in err
     assert "a FIT learned from 80 frames" in out
     assert "3 FAPs to send: " in out
@@ -51,7 +47,7 @@ def test_a_table_is_learned_stored_and_written(run: Run, here: Path) -> None:
     monday = fba.read("monday.fap").face
     shown = resolve(send_sources(monday, head.fit), head)
     assert shown[:, LIP] == pytest.approx(monday.values[:, LIP], abs=1)
-    assert "its own table" in run("model", "info", "ada.glb")[1]
+    assert "its own table" in run("model", "info", "ada.glb").out
     _, out, _ = run("model", "learn-fit", "monday.fap", "--faps", 3, "--model", "ada.glb", "-o", "again.glb")
     assert "in place of its own" in out
 
@@ -68,8 +64,7 @@ def test_figures_for_programs(run: Run, here: Path) -> None:
         "ada.glb",
         "--json",
     ]
-    code, out, _ = run(*line, "--tolerance", "0.5mm")
-    assert code == 0
+    out = run(*line, "--tolerance", "0.5mm").out
     said = json.loads(out)
     assert said["output"] == "ada.glb"
     assert (said["frames"], said["streams"]) == (80, 2)
@@ -94,24 +89,23 @@ def test_mistakes(run: Run, here: Path, options: list[str], status: int, message
     still = FaceTrack(np.zeros((5, 68), dtype=np.int32), np.tile(np.arange(68) > 1, (5, 1)))
     fba.write("still.fap", Animation(Fraction(25), np.arange(5), still))
     streams = [] if options[0].endswith("ap") and not options[0].startswith("--") else ["monday.fap"]
-    code, _, err = run("model", "learn-fit", *streams, *options, "--model", "head.glb", "-o", "ada.glb")
-    assert code == status
+    err = run(
+        "model", "learn-fit", *streams, *options, "--model", "head.glb", "-o", "ada.glb", code=status
+    ).err
     assert message in " ".join(err.split())
     assert not Path("ada.glb").exists()
 
 
 def test_a_model_is_named_as_one(run: Run, here: Path) -> None:
-    code, _, err = run("model", "learn-fit", "monday.fap", "-o", "ada.json")
-    assert code == 2
-    assert "name it ada.glb" in err
+    assert "name it ada.glb" in run("model", "learn-fit", "monday.fap", "-o", "ada.json", code=2).err
 
 
 def test_a_stream_leaves_to_the_head_what_it_computes(run: Run, here: Path) -> None:
     run(
         "model", "learn-fit", "monday.fap", "tuesday.fap", "--faps", 3, "--model", "head.glb", "-o", "ada.glb"
     )
-    code, out, err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "ada.glb", "--json")
-    assert (code, err) == (0, "")
+    _, out, err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "ada.glb", "--json")
+    assert err == ""
     said = json.loads(out)["fit"]
     assert len(said["sent"]) == 3
     assert said["added"] == []
@@ -122,13 +116,13 @@ def test_a_stream_leaves_to_the_head_what_it_computes(run: Run, here: Path) -> N
     assert shown[:, LIP] == pytest.approx(fba.read("monday.fap").face.values[:, LIP], abs=1)
     assert "3 FAPs sent; the head computes the others" in run(
         "encode", "monday.fap", "-o", "small.fba", "--fit", "ada.glb"
-    )[1]  # fmt: skip
+    ).out  # fmt: skip
 
 
 def test_a_stream_for_a_head_without_a_table_is_refused(run: Run, here: Path) -> None:
-    code, _, err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "head.glb")
-    assert code == 1
+    err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "head.glb", code=1).err
     assert "has no interpolation table (FIT)" in " ".join(err.split())
-    code, _, err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "head.glb", "--preset", "compact")
-    assert code == 2
+    err = run(
+        "encode", "monday.fap", "-o", "small.fba", "--fit", "head.glb", "--preset", "compact", code=2
+    ).err
     assert "the table of the head decides what is sent" in " ".join(err.split())

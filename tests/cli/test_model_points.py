@@ -1,20 +1,17 @@
 """`fba model points`: what is said before and after the window, which other tests open."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from command_line import Run
 from fba.face.importers.head_surface import HeadSurface
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.window import pages
 from mesh_files import write_obj
 from small_head import small_head
-
-Run = Callable[..., Any]
 
 
 @pytest.fixture
@@ -44,12 +41,12 @@ def test_saved_points_are_reported_with_the_next_command(
 ) -> None:
     points = tmp_path / "head.points.csv"
     user.append(lambda placement: placement.save())
-    code, out, err = run("model", "points", head, "-o", points)
-    assert (code, err) == (0, "")
+    _, out, err = run("model", "points", head, "-o", points)
+    assert err == ""
     assert "no face can be made without 3.1, 3.3, 3.2, 3.4, 9.15, 2.2, 8.3, 8.4" in out
     user.insert(0, lambda placement: placement.places.update(dict.fromkeys(placement.missing_units, 5)))
-    code, out, err = run("model", "points", head, "--points", points, "-o", points, "--kind", "obj")
-    assert (code, err) == (0, "")
+    _, out, err = run("model", "points", head, "--points", points, "-o", points, "--kind", "obj")
+    assert err == ""
     assert f"next: fba model import {head} --points {points} --kind obj -o head.fba.glb" in out
 
 
@@ -60,21 +57,18 @@ def test_parts_that_are_left_out_are_not_shown(
     user.append(lambda placement: shown.extend(part.name for part in placement.surface.parts))
     user.append(lambda placement: placement.places.update(dict.fromkeys(placement.missing_units, 5)))
     user.append(lambda placement: placement.save())
-    code, out, _ = run("model", "points", head, "-o", points, "--part", "left eye=none")
-    assert code == 0
+    out = run("model", "points", head, "-o", points, "--part", "left eye=none").out
     assert "skin" in shown
     assert "left eye" not in shown
     assert "--part 'left eye=none'" in out
-    code, _, err = run("model", "points", head, "-o", points, "--part", "left eye=nose")
-    assert code == 2
+    err = run("model", "points", head, "-o", points, "--part", "left eye=nose", code=2).err
     assert "write NAME=KIND" in err
 
 
 def test_closing_without_saving_fails(
     run: Run, head: Path, user: list[Callable[[PointPlacement], None]], tmp_path: Path
 ) -> None:
-    code, out, _ = run("model", "points", head, "-o", tmp_path / "p.csv")
-    assert code == 1
+    out = run("model", "points", head, "-o", tmp_path / "p.csv", code=1).out
     assert "not written, as the window was closed without saving" in out
     assert not (tmp_path / "p.csv").exists()
 
@@ -84,7 +78,7 @@ def test_without_a_display_it_says_how_to_write_the_file(
 ) -> None:
     monkeypatch.setenv("DISPLAY", ":990")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    code, _, err = run("model", "points", head, "-o", tmp_path / "p.csv")
+    code, _, err = run("model", "points", head, "-o", tmp_path / "p.csv", code=None)
     assert code != 0
     assert "'name,vertex'" in err
     assert "fba render" not in err
@@ -92,13 +86,10 @@ def test_without_a_display_it_says_how_to_write_the_file(
 
 @pytest.mark.parametrize(("output", "words"), [("-", "give the name of a file"), ("p.json", "name it p.csv")])
 def test_points_are_written_as_csv(run: Run, head: Path, output: str, words: str) -> None:
-    code, _, err = run("model", "points", head, "-o", output)
-    assert code == 2
-    assert words in err
+    assert words in run("model", "points", head, "-o", output, code=2).err
 
 
 def test_the_head_is_not_overwritten(run: Run, head: Path) -> None:
     before = head.read_bytes()
-    code, _, _ = run("model", "points", head, "-o", head)
-    assert code == 2
+    run("model", "points", head, "-o", head, code=2)
     assert head.read_bytes() == before

@@ -1,17 +1,15 @@
 """`fba persona`: learn, info and play; files that are none, of other versions, or damaged."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fba
+from command_line import Run
 from fba.errors import FormatError, LimitError, UnsupportedError
 from fba.face import FaceModel
 from fba.persona import Persona, read_recording, write_recording
@@ -20,7 +18,6 @@ from tools.captures import point_files
 from tools.captures.tracked_actor import film
 from tools.persona.actors import Style, act
 
-Run = Callable[..., tuple[int, str, str]]
 SCRIPT = [("E_HAPPY", 0.6), ("E_HAPPY", 0.9), ("LFAU_27", 0.8), ("UFAU_43", 1.0)]
 
 
@@ -37,16 +34,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def persona(folder: Path, run: Run) -> Path:
     path = folder / "actor.persona"
     if not path.exists():
-        assert run("persona", "learn", folder / "actor.npz", "-o", path)[0] == 0
+        run("persona", "learn", folder / "actor.npz", "-o", path)
     return path
 
 
 def test_learn_says_what_is_missing_and_writes_a_report(folder: Path, run: Run, tmp_path: Path) -> None:
     out, page = tmp_path / "a.persona", tmp_path / "a.html"
-    code, said, err = run(
-        "persona", "learn", folder / "actor.npz", "-o", out, "--report", page, "--name", "Ann"
-    )
-    assert (code, err) == (0, "")
+    _, said, err = run("persona", "learn", folder / "actor.npz", "-o", out, "--report", page, "--name", "Ann")
+    assert err == ""
     frames = len(read_recording(folder / "actor.npz"))
     assert said.splitlines()[0] == f"{out}: {frames} of {frames} frames"
     assert "mouth: " in said
@@ -57,10 +52,9 @@ def test_learn_says_what_is_missing_and_writes_a_report(folder: Path, run: Run, 
 
 
 def test_info_lists_masks(persona: Path, run: Run) -> None:
-    code, said, _ = run("persona", "info", persona)
-    assert code == 0
+    said = run("persona", "info", persona).out
     assert "masks of mouth: " in said
-    report = json.loads(run("persona", "info", persona, "--json")[1])
+    report = json.loads(run("persona", "info", persona, "--json").out)
     assert report["name"] == "actor"
     assert report["parts"]["mouth"]["masks"]["E_HAPPY"] >= 1
     assert "LFAU_22" in report["parts"]["mouth"]["missing"]
@@ -75,12 +69,10 @@ def test_a_persona_of_version_1_is_read_and_what_it_lacks_is_said(
     lacks = {f"_{part}.{name}": None for part in PARTS for name in ("seconds", "spread", "speed")}
     old = repacked(persona, tmp_path / "old.persona", version=1, **lacks)
     assert Persona.load(old).motions is None
-    assert "motion: not known, as the file is of version 1; learn it again" in run("persona", "info", old)[1]
+    assert "motion: not known, as the file is of version 1; learn it again" in run("persona", "info", old).out
     play = ("persona", "play", folder / "user.npz", "--persona")
-    code, _, err = run(*play, old, "-o", tmp_path / "old.fap")
-    assert (code, "no statistics of motion" in err) == (0, True)
-    code, _, err = run(*play, persona, "--means", "curves", "-o", tmp_path / "new.fap")
-    assert (code, err) == (0, "")
+    assert "no statistics of motion" in run(*play, old, "-o", tmp_path / "old.fap").err
+    assert run(*play, persona, "--means", "curves", "-o", tmp_path / "new.fap").err == ""
     old_lines, new_lines = (
         (tmp_path / f"{name}.fap").read_text().splitlines()[1:] for name in ("old", "new")
     )
@@ -89,8 +81,8 @@ def test_a_persona_of_version_1_is_read_and_what_it_lacks_is_said(
 
 def test_play_writes_faps_in_the_actors_way(folder: Path, persona: Path, run: Run, tmp_path: Path) -> None:
     for name, options in (("own.fap", []), ("acted.fap", ["--persona", persona])):
-        code, said, err = run("persona", "play", folder / "user.npz", *options, "-o", tmp_path / name)
-        assert (code, err) == (0, "")
+        _, said, err = run("persona", "play", folder / "user.npz", *options, "-o", tmp_path / name)
+        assert err == ""
         assert f"{name}: " in said
     own, acted = (fba.read(tmp_path / name).face for name in ("own.fap", "acted.fap"))
     assert own is not None
@@ -98,18 +90,15 @@ def test_play_writes_faps_in_the_actors_way(folder: Path, persona: Path, run: Ru
     smile = slice(45, 60)
     uneven = [float((one.values[smile, 11] - one.values[smile, 12]).mean()) for one in (own, acted)]
     assert uneven[1] > uneven[0] + 50
-    code, _, err = run("persona", "play", folder / "user.npz", "-o", tmp_path / "a.fba", "--user", persona)
-    assert code == 2
+    err = run("persona", "play", folder / "user.npz", "-o", tmp_path / "a.fba", "--user", persona, code=2).err
     assert "--user goes with --persona" in err
 
 
 def test_points_of_other_trackers_are_read(persona: Path, run: Run, tmp_path: Path) -> None:
     motion = film(FaceModel.default(), 68, frames=60, flat=True, turn=0.3).motion
     (tmp_path / "user.csv").write_bytes(point_files.wide(motion))
-    code, _, err = run(
-        "persona", "play", tmp_path / "user.csv", "--persona", persona, "-o", tmp_path / "a.fap"
-    )
-    assert (code, err) == (0, "")
+    err = run("persona", "play", tmp_path / "user.csv", "--persona", persona, "-o", tmp_path / "a.fap").err
+    assert err == ""
     assert len(fba.read(tmp_path / "a.fap")) == 60
 
 
@@ -117,14 +106,13 @@ def test_the_aspect_of_a_picture_may_be_given(persona: Path, run: Run, tmp_path:
     motion = film(FaceModel.default(), 478, frames=40, share=True, turn=0.3).motion
     (tmp_path / "user.csv").write_bytes(point_files.wide(motion))
     play = ("persona", "play", tmp_path / "user.csv", "--persona", persona, "-o", tmp_path / "a.fap")
-    assert "give its aspect with --aspect 1.778" in run(*play)[2]
-    assert run(*play, "--aspect", "16:9")[::2] == (0, "")
+    assert "give its aspect with --aspect 1.778" in run(*play).err
+    assert run(*play, "--aspect", "16:9").err == ""
 
 
 def test_files_without_tracked_points_are_refused(persona: Path, run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.fap").write_text("2.1 a 25 1\n" + "0 " * 67 + "0\n0\n")
-    code, _, err = run("persona", "learn", tmp_path / "a.fap", "-o", tmp_path / "a.persona")
-    assert code == 1
+    err = run("persona", "learn", tmp_path / "a.fap", "-o", tmp_path / "a.persona", code=1).err
     assert "is not a file of tracked points" in err
     np.savez(tmp_path / "short.npz", points=np.zeros((9, 64, 2)), angles=np.zeros((4, 3)))
     with pytest.raises(FormatError, match=r"9 frames of points, but angles \(4, 3\)"):
@@ -132,17 +120,15 @@ def test_files_without_tracked_points_are_refused(persona: Path, run: Run, tmp_p
     np.savez(tmp_path / "rate.npz", points=np.zeros((9, 64, 2)), fps=np.array([25.0, 30.0]))
     with pytest.raises(FormatError, match="fps must be one number"):
         read_recording(tmp_path / "rate.npz")
-    code, _, err = run("persona", "learn", persona, "-o", tmp_path / "b.persona")
-    assert code == 1
+    run("persona", "learn", persona, "-o", tmp_path / "b.persona", code=1)
 
 
 def test_a_user_who_looks_away(folder: Path, persona: Path, run: Run, tmp_path: Path) -> None:
     face = read_recording(folder / "user.npz")
     np.savez(tmp_path / "away.npz", points=face.points, angles=face.angles + np.array([0, 0.8, 0]), fps=30.0)
-    code, _, err = run(
-        "persona", "play", tmp_path / "away.npz", "--persona", persona, "-o", tmp_path / "a.fba"
-    )
-    assert code == 1
+    err = run(
+        "persona", "play", tmp_path / "away.npz", "--persona", persona, "-o", tmp_path / "a.fba", code=1
+    ).err
     assert "with a head turned by more than 30 degrees" in err
     assert not (tmp_path / "a.fba").exists()
 
@@ -207,8 +193,7 @@ def test_damaged_personas(persona: Path, run: Run, tmp_path: Path) -> None:
         path.write_bytes(part)
         with pytest.raises(FormatError, match=r"a\.persona: "):
             Persona.load(path)
-    code, _, err = run("persona", "info", path)
-    assert (code, err) == (1, f"fba: error: {path}: is not a persona file\n")
+    assert run("persona", "info", path, code=1).err == f"fba: error: {path}: is not a persona file\n"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("header.json", json.dumps({"kind": "persona", "version": 1}))
         archive.writestr("neutral.npy", b"0" * 300_000_000)

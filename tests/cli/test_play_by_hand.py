@@ -1,19 +1,15 @@
 """`fba play` without a file: a neutral figure to move by hand."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from command_line import Run
 from fba import player
 from fba.body import BodyModel
 from fba.face import FaceModel
-
-Run = Callable[..., Any]
 
 
 @pytest.fixture
@@ -27,7 +23,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, dict[str, Any]]]:
 
 def test_a_face_alone(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
     FaceModel.default().save(tmp_path / "mine.glb")
-    assert run("play", "--model", tmp_path / "mine.glb", "--size", "640x480").code == 0
+    run("play", "--model", tmp_path / "mine.glb", "--size", "640x480")
     scene, options = opened[0]
     assert not scene.has_body
     assert not np.any(scene.timeline.faps(0.0))
@@ -37,7 +33,7 @@ def test_a_face_alone(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_pa
 
 def test_a_body_with_a_face(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
     BodyModel.default().save(tmp_path / "body.glb")
-    assert run("play", "--body", tmp_path / "body.glb", "--show", "grid").code == 0
+    run("play", "--body", tmp_path / "body.glb", "--show", "grid")
     scene, _ = opened[0]
     assert scene.has_body
     assert scene.switches["grid"]
@@ -45,7 +41,7 @@ def test_a_body_with_a_face(run: Run, opened: list[tuple[Any, dict[str, Any]]], 
 
 
 def test_without_anything_the_built_in_person(run: Run, opened: list[tuple[Any, dict[str, Any]]]) -> None:
-    assert run("play").code == 0
+    run("play")
     scene, options = opened[0]
     assert scene.has_body
     assert (options["panels"], options["title"]) == (("puppet",), "puppet")
@@ -57,7 +53,5 @@ def test_options_that_need_a_file(run: Run, opened: list[tuple[Any, dict[str, An
         (("--compare", "--model", tmp_path / "mine.glb"), "--compare needs two files"),
         (("--model", tmp_path / "mine.glb", "--audio", tmp_path / "mine.glb"), "--audio goes with a file"),
     ):
-        refused = run("play", *words)
-        assert refused.code == 2
-        assert said in refused.err
+        assert said in run("play", *words, code=2).err
     assert not opened

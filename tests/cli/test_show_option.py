@@ -1,15 +1,13 @@
 """`--show`: switches of the player, in pictures from the command line."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-Run = Callable[..., tuple[int, str, str]]
+from command_line import Run
+
 FACE = ("--fap", "open_jaw=200", "--size", "64x48", "--camera", "front")
 
 
@@ -28,18 +26,16 @@ def test_unknown_switches_are_bad_usage(run: Run, tmp_path: Path, command: str, 
     file = tmp_path / "none.fap"
     file.write_text("2.1 none 25 0\n")
     output = ("-o", tmp_path / "out.png") if command == "render" else ()
-    code, _, error = run(command, file, *output, "--show", text)
-    assert code == 2
-    assert said in error
+    assert said in run(command, file, *output, "--show", text, code=2).err
     assert not (tmp_path / "out.png").exists()
 
 
 @pytest.mark.usefixtures("opengl")
 def test_switches_are_in_the_picture(run: Run, tmp_path: Path) -> None:
     plain, dressed = tmp_path / "plain.png", tmp_path / "dressed.png"
-    assert run("render", *FACE, "-o", plain)[0] == 0
+    run("render", *FACE, "-o", plain)
     shown = ("--show", "influence=open_jaw", "--show", "eyes=off", "--show", "background=grey")
-    assert run("render", *FACE, *shown, "-o", dressed)[0] == 0
+    run("render", *FACE, *shown, "-o", dressed)
     before, after = (np.asarray(Image.open(path)).astype(int) for path in (plain, dressed))
     assert (np.ptp(after[:8, :8, :3], axis=(0, 1)) == 0).all()  # a plain background
     middle = after[14:24, 26:38, :3]
@@ -50,7 +46,7 @@ def test_switches_are_in_the_picture(run: Run, tmp_path: Path) -> None:
 @pytest.mark.usefixtures("opengl")
 def test_a_transparent_background_is_in_the_file(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "clear.png"
-    assert run("render", *FACE, "--show", "background=transparent", "-o", path)[0] == 0
+    run("render", *FACE, "--show", "background=transparent", "-o", path)
     pixels = np.asarray(Image.open(path))
     assert pixels.shape == (48, 64, 4)
     assert pixels[2, 2, 3] == 0

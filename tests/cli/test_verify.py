@@ -1,21 +1,17 @@
 """`fba verify`: complete, cut, damaged and changed streams."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import struct
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fba
+from command_line import Run
 from fba.codec import digest
 from tools import synthetic_motion as motion
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
@@ -48,9 +44,8 @@ def streams(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_report_about_a_stream(
     streams: Path, run: Run, name: str, code: int, expected: tuple[object, ...]
 ) -> None:
-    status, out, _ = run("verify", "--json", streams / f"{name}.fba")
+    out = run("verify", "--json", streams / f"{name}.fba", code=code).out
     report = json.loads(out)
-    assert status == code
     fields = ("intact", "frames", "ended", "frames_lost", "doubtful")
     intact, frames, ended, lost, doubtful = (report[field] for field in fields)
     assert (intact, frames, ended, len(report["damage"]), lost, doubtful) == expected
@@ -58,9 +53,8 @@ def test_the_report_about_a_stream(
 
 
 def test_the_table_and_the_damage_below_it(streams: Path, run: Run) -> None:
-    code, out, _ = run("verify", *(streams / f"{name}.fba" for name in ("good", "damaged", "cut")))
+    out = run("verify", *(streams / f"{name}.fba" for name in ("good", "damaged", "cut")), code=1).out
     head, good, damaged, cut, *lines = out.splitlines()
-    assert code == 1
     assert head.split() == [
         "file",
         "frames",
@@ -83,27 +77,18 @@ def test_the_table_and_the_damage_below_it(streams: Path, run: Run) -> None:
 def test_a_change_that_the_syntax_does_not_show(streams: Path, run: Run, tmp_path: Path) -> None:
     place, report = tmp_path / "a.fba", tmp_path / "report.json"
     place.write_bytes((streams / "good.fba").read_bytes())
-    report.write_text(run("verify", "--json", place)[1])
-    code, out, _ = run("verify", place, "--against", report)
-    assert code == 0
-    assert "intact, unchanged" in out
+    report.write_text(run("verify", "--json", place).out)
+    assert "intact, unchanged" in run("verify", place, "--against", report).out
     place.write_bytes((streams / "changed.fba").read_bytes())
-    code, out, _ = run("verify", place, "--against", report)
-    assert code == 1
-    assert "intact, CHANGED" in out
-    code, out, _ = run("verify", streams / "good.fba", "--against", report)
-    assert code == 0
-    assert "intact, not in the report" in out
+    assert "intact, CHANGED" in run("verify", place, "--against", report, code=1).out
+    assert "intact, not in the report" in run("verify", streams / "good.fba", "--against", report).out
     report.write_text('{"file": 3}')
-    code, _, err = run("verify", place, "--against", report)
-    assert code == 1
-    assert "this is no report of fba verify --json" in err
+    assert "this is no report of fba verify --json" in run("verify", place, "--against", report, code=1).err
 
 
 def test_other_files_are_named(streams: Path, run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("no stream")
-    code, out, err = run("verify", tmp_path / "a.txt", streams / "good.fba")
-    assert code == 1
+    _, out, err = run("verify", tmp_path / "a.txt", streams / "good.fba", code=1)
     assert "no FBA object start code" in err
     assert "good.fba" in out
 

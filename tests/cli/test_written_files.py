@@ -1,20 +1,16 @@
 """decode --output and convert: files for other programs, and the options of their writers."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fba
+from command_line import Run
 from fba import Animation
 from fba.body import BodyModel
 from fba.gltf import read_gltf
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
@@ -31,23 +27,20 @@ def joints(path: Path) -> list[str]:
 
 def test_a_stream_becomes_a_person(run: Run, tmp_path: Path, stream: Path) -> None:
     target = tmp_path / "person.glb"
-    code, out, err = run("decode", stream, "-o", target, "--bap-steps", "visage")
-    assert (code, out, err) == (0, f"{stream}: 50 frames to {target}\n", "")
+    assert run("decode", stream, "-o", target, "--bap-steps", "visage")[1:] == (
+        f"{stream}: 50 frames to {target}\n",
+        "",
+    )
     both, back = fba.read(stream, bap_steps="visage"), fba.read(target)
     assert back.face == both.face
-    assert back.body is not None
-    assert both.body is not None
     assert np.abs(back.body.values[:, 183] - both.body.values[:, 183]).max() <= 1
 
 
 def test_a_stream_becomes_bvh(run: Run, tmp_path: Path, stream: Path) -> None:
     target = tmp_path / "all.bvh"
-    code, _, err = run("decode", stream, "-o", target)
-    assert code == 0
-    assert "BVH holds no face; only the body was written" in err
+    assert "BVH holds no face; only the body was written" in run("decode", stream, "-o", target).err
     assert len(joints(target)) == 87
-    code, _, _ = run("decode", stream, "-o", tmp_path / "few.bvh", "--joints", "moving", "--unit", "m")
-    assert code == 0
+    run("decode", stream, "-o", tmp_path / "few.bvh", "--joints", "moving", "--unit", "m")
     few = joints(tmp_path / "few.bvh")
     assert "l_knee" in few
     assert len(few) < 20
@@ -63,9 +56,9 @@ def heights(path: Path) -> list[str]:
 
 
 def test_convert_takes_the_same_options(run: Run, tmp_path: Path, stream: Path) -> None:
-    assert run("convert", stream, tmp_path / "a.bvh", "--joints", "moving")[0] == 0
+    run("convert", stream, tmp_path / "a.bvh", "--joints", "moving")
     assert len(joints(tmp_path / "a.bvh")) < 20
-    assert run("convert", stream, tmp_path / "a.glb", "--no-mesh")[0] == 0
+    run("convert", stream, tmp_path / "a.glb", "--no-mesh")
     assert read_gltf(tmp_path / "a.glb").meshes == ()
     assert fba.read(tmp_path / "a.glb").face == fba.read(stream).face
 
@@ -74,14 +67,14 @@ def test_another_body_and_axes(run: Run, tmp_path: Path, stream: Path) -> None:
     person = BodyModel.default()
     person.save(tmp_path / "body.glb")
     target = tmp_path / "a.glb"
-    code, _, err = run("convert", stream, target, "--body", tmp_path / "body.glb", "--axes", "vreng")
-    assert (code, err) == (0, f"fba: {stream}: BAP steps visage: the stream says so\n")
+    assert (
+        run("convert", stream, target, "--body", tmp_path / "body.glb", "--axes", "vreng").err
+        == f"fba: {stream}: BAP steps visage: the stream says so\n"
+    )
     assert {part.name for part in person.parts if part.kind != "neck"} <= {
         mesh.name for mesh in read_gltf(target).meshes
     }
-    code, _, err = run("convert", stream, target, "--model", tmp_path / "body.glb")
-    assert code == 1
-    assert "body.glb" in err
+    assert "body.glb" in run("convert", stream, target, "--model", tmp_path / "body.glb", code=1).err
 
 
 @pytest.mark.parametrize(
@@ -110,15 +103,12 @@ def test_options_that_do_not_fit(
     message: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code, _, err = run("decode", stream.name, *arguments)
-    assert code == 2
-    assert message in " ".join(err.split())
+    assert message in " ".join(run("decode", stream.name, *arguments, code=2).err.split())
     assert [path.name for path in tmp_path.iterdir()] == ["both.fba"]
 
 
 def test_convert_names_a_misplaced_option(run: Run, tmp_path: Path, stream: Path) -> None:
-    code, _, err = run("convert", stream, tmp_path / "a.bap", "--mesh")
-    assert code == 2
+    err = run("convert", stream, tmp_path / "a.bap", "--mesh", code=2).err
     assert "--mesh/--no-mesh is an option for GLTF" in err
     assert not (tmp_path / "a.bap").exists()
 
@@ -127,16 +117,16 @@ def test_a_folder_of_files(run: Run, tmp_path: Path, stream: Path, face: Animati
     other = tmp_path / "talk.fba"
     fba.write(other, face)
     (tmp_path / "out").mkdir()
-    assert run("decode", stream, other, "-o", tmp_path / "out", "--to", "glb")[0] == 0
+    run("decode", stream, other, "-o", tmp_path / "out", "--to", "glb")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["both.glb", "talk.glb"]
-    code, _, err = run("decode", other, "-o", tmp_path / "talk.bvh", "--fap", tmp_path / "talk.fap")
-    assert code == 2
+    err = run("decode", other, "-o", tmp_path / "talk.bvh", "--fap", tmp_path / "talk.fap", code=2).err
     assert "carries no BAPs; leave --output out" in err
     assert not (tmp_path / "talk.fap").exists()  # nothing is half done
 
 
 def test_a_missing_part_matters_only_if_it_is_to_be_written(run: Run, tmp_path: Path, stream: Path) -> None:
-    code, _, err = run("decode", stream, "--fap", tmp_path / "a.fap")
-    assert (code, err) == (0, "")
-    code, _, err = run("decode", stream, "--fap", tmp_path / "a.fap", "--bap", tmp_path / "a.bap")
-    assert (code, err) == (0, f"fba: {stream}: BAP steps visage: the stream says so\n")
+    assert run("decode", stream, "--fap", tmp_path / "a.fap").err == ""
+    assert (
+        run("decode", stream, "--fap", tmp_path / "a.fap", "--bap", tmp_path / "a.bap").err
+        == f"fba: {stream}: BAP steps visage: the stream says so\n"
+    )

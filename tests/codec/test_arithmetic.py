@@ -1,7 +1,5 @@
 """The compiled arithmetic coder against the textbook's, in both directions."""
 
-from __future__ import annotations
-
 from random import Random
 
 import numpy as np

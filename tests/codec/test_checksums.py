@@ -1,7 +1,5 @@
 """The CRC-32 of each I period behind the end of a stream: flipped bits are noticed."""
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from functools import cache
@@ -119,8 +117,6 @@ def test_a_wrong_period_is_named_and_left_out(options: EncoderOptions, period: i
         rescued = fba.decode(data, on_error="salvage")
     kept = np.array([frame not in planes for frame in range(60)])
     assert rescued.index.tolist() == true.index[kept].tolist()
-    assert rescued.body is not None
-    assert true.body is not None
     assert (rescued.body.values == true.body.values[kept]).all()
     found = verify_stream(data)
     assert (found.intact, found.ended, found.doubtful, found.frames) == (False, True, PERIOD, 50)

@@ -1,19 +1,11 @@
 """Code lengths are those of the coder; quantised values are those of the decoder."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 import fba
 from fba import Animation, BodyTrack, EncoderOptions, FaceTrack
-from fba.codec import (
-    Encoder,
-    coarsest_quantisers,
-    count_rounded,
-    exact_quantisers,
-    quantise,
-)
+from fba.codec import Encoder, coarsest_quantisers, count_rounded, exact_quantisers, quantise
 from fba.parameters import bap_steps, faps
 from fba.planning._code_lengths import code_lengths
 
@@ -120,7 +112,6 @@ def test_prices_of_the_next_plane() -> None:
     encoder.settle(11)
     before = encoder.bits
     plane = encoder.next_plane(animation[11:12])
-    assert plane is not None
     assert plane.levels(np.ones(364), 0.0).tolist() == [3]
     assert plane.levels(np.full(364, np.inf), np.inf).tolist() == [3]
     assert plane.levels(np.ones(364), np.inf).tolist() == [0]

@@ -1,7 +1,5 @@
 """Planes that hold nearly nothing: they take little memory and time, however many there are."""
 
-from __future__ import annotations
-
 import tracemalloc
 from collections.abc import Callable
 from functools import partial
@@ -139,7 +137,6 @@ def test_arrays_are_made_when_they_are_asked_for() -> None:
         animation = decode(data)
         assert animation == decode(data)
         assert len(animation[1000:2000]) == 1000
-        assert animation.body is not None
         assert animation.body[5:7].values.shape == (2, 296)
         assert animation.body[10:0:1].values.shape == (0, 296)
         assert animation.body[1:9:3].mask.shape == (3, 296)

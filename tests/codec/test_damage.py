@@ -1,7 +1,5 @@
 """Streams cut at every byte and with every single bit flipped: an error or a salvaged result, never else."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from fractions import Fraction

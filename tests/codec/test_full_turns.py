@@ -1,7 +1,5 @@
 """Angles that pass half a turn: coded the short way or by an I plane, and what cannot be sent is named."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -36,9 +34,7 @@ def coded(animation: Animation, **options: object) -> tuple[np.ndarray, EncoderS
     """The BAPs that a decoder returns, as int64, and what the encoder counted."""
     chosen = EncoderOptions(**options)  # type: ignore[arg-type]
     data, statistics = encode_animation(animation, chosen)
-    track = fba.decode(data, bap_steps=chosen.bap_steps).body
-    assert track is not None
-    return track.values.astype(np.int64), statistics
+    return fba.decode(data, bap_steps=chosen.bap_steps).body.values.astype(np.int64), statistics
 
 
 def angle_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:

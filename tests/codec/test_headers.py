@@ -1,7 +1,5 @@
 """Every header element: written from settings, read by the independent reader and by the decoder."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

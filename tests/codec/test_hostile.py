@@ -1,7 +1,5 @@
 """Streams made to do harm: huge claims, endless headers, floods of start codes, what is reserved."""
 
-from __future__ import annotations
-
 import time
 import tracemalloc
 import warnings
@@ -23,16 +21,7 @@ from codec_streams import (
     packed,
     segment,
 )
-from fba import (
-    BitstreamError,
-    Decoder,
-    FbaError,
-    FbaWarning,
-    LimitError,
-    Limits,
-    UnsupportedError,
-    decode,
-)
+from fba import BitstreamError, Decoder, FbaError, FbaWarning, LimitError, Limits, UnsupportedError, decode
 from fba.codec import probe_stream
 from fba.parameters import bap_groups
 from fba_conformance._textbook import FrequencyTable, encode_segment

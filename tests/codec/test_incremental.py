@@ -1,7 +1,5 @@
 """Chunks of any size, frames as soon as they are whole, flat memory; the encoder frame by frame."""
 
-from __future__ import annotations
-
 import copy
 import gc
 import tracemalloc

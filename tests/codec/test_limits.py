@@ -1,7 +1,5 @@
 """What the syntax cannot carry: refused with parameter, frame and the way out, or clamped and counted."""
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 
@@ -45,7 +43,6 @@ def test_the_largest_value(table: str, part: str, numbers: tuple[int, ...], quan
             chosen = options(part, quant, bap_steps=table)
             got = decode(encode(one_value(part, number, [0, sign * largest]), chosen), bap_steps=table)
             track = got.face if part == "face" else got.body
-            assert track is not None
             assert int(track.values[1, number - 1]) == sign * whole
             with pytest.raises(RangeError, match=rf"the largest is {largest};") as caught:
                 encode(one_value(part, number, [0, 0, sign * (largest + 1)]), chosen)
@@ -99,9 +96,7 @@ def test_clamped_values_are_counted_and_the_nearest_possible() -> None:
     with pytest.raises(RangeError, match="400000 cannot be carried"):
         encode(animation)
     coded, statistics = encode_animation(animation, EncoderOptions(clamp=True))
-    got = decode(coded).face
-    assert got is not None
-    values = got.values[:, 47].tolist()
+    values = decode(coded).face.values[:, 47].tolist()
     nearest = [400_010, -400_010]  # multiples of 170 next to +-400000 ...
     assert nearest[0] == 2353 * 170
     assert values[0] == largest
@@ -124,7 +119,6 @@ def test_clamping_leaves_other_parameters_alone() -> None:
         Animation(Fraction(25), np.arange(4), FaceTrack(values, mask)), EncoderOptions(clamp=True)
     )
     got = decode(coded).face
-    assert got is not None
     assert got.values[:, 2].tolist() == [4, 8, -12, 400]
     assert got.values[[1, 3], 47].tolist() == [170, 340]
     assert statistics.clamped >= 2
@@ -189,7 +183,6 @@ def test_a_value_at_the_end_of_int32_is_rounded_inwards(sign: int) -> None:
     ramp = np.clip(sign * 900_000 * np.arange(2400, dtype=np.int64), -(2**31), 2**31 - 1)
     wide = next(bap.number for bap in baps() if bap.step_iso == 512)
     decoded = decode(encode(one_value("body", wide, ramp.tolist())))
-    assert decoded.body is not None
     error = np.abs(decoded.body.values[:, wide - 1] - ramp)
     assert error[:2386].max() <= 256
     assert error.max() < 512

@@ -1,7 +1,5 @@
 """Streams that readers with any kind of look-ahead for start codes read alike."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What was lost, and when it goes on: time codes at restart points, lost frames counted, planes in doubt."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from fractions import Fraction

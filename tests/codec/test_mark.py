@@ -1,7 +1,5 @@
 """The mark behind the end of a stream, which names its table of BAP steps."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np
@@ -33,7 +31,6 @@ def stream(table: str = "visage", *, mark: bool = True, **options: int) -> bytes
 
 
 def shoulder(animation: Animation) -> list[int]:
-    assert animation.body is not None
     return animation.body.values[:, SHOULDER].tolist()
 
 

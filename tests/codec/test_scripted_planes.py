@@ -1,7 +1,5 @@
 """Planes encoded as they are told to be, and what settings that do not fit are answered with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 
@@ -53,16 +51,12 @@ def test_planes_code_the_frames_that_they_name() -> None:
     planes = [INTRA, predicted(12), replace(predicted(11), skip=2), predicted(11)]
     animation = decode(encode_planes(jaw(100, 108, 120), planes))
     assert animation.index.tolist() == [0, 1, 2, 5]
-    assert animation.face is not None
     assert animation.face.values[:, OPEN_JAW].tolist() == [100, 120, 108, 108]
 
 
 @pytest.mark.parametrize(
     ("planes", "message"),
-    [
-        ([], "no planes to encode"),
-        ([predicted(10)], "plane 0 is a P plane before the first I plane"),
-    ],
+    [([], "no planes to encode"), ([predicted(10)], "plane 0 is a P plane before the first I plane")],
 )
 def test_planes_in_an_order_that_cannot_be_coded(planes: list[PlaneSettings], message: str) -> None:
     with pytest.raises(ValueError, match=message):
@@ -111,8 +105,6 @@ def test_p_planes_of_a_face_alone_between_those_of_both() -> None:
     first = replace(INTRA, body_frame=10, body=part)
     second = PlaneSettings(False, 11, 11, INTRA.face, part)
     animation = decode(encode_planes(both, [first, second, predicted(12), second]))
-    assert animation.face is not None
-    assert animation.body is not None
     assert animation.face.values[:, OPEN_JAW].tolist() == [4, 8, 12, 8]
     assert animation.body.mask[:, 0].tolist() == [True, True, False, True]
 

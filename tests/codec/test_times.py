@@ -1,7 +1,5 @@
 """Frame rates, skips and time codes, in exact fractions."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction
@@ -221,7 +219,6 @@ def test_masks_that_change_from_plane_to_plane() -> None:
     for block in blocks:
         frames.add(block)
     face = frames.decoded().face
-    assert face is not None
     sent = [[3]] * 2 + [[3, 4]] * 3 + [[3]]
     assert [(np.flatnonzero(row) + 1).tolist() for row in face.mask] == sent
 

@@ -1,7 +1,5 @@
 """Without machine code, and without numba at all: the same values and bytes, slower, and no warning."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Streams of real applications and of another encoder: values, masks, bytes and times must be exact."""
 
-from __future__ import annotations
-
 import json
 import os
 import warnings
@@ -114,7 +112,6 @@ def test_planes_as_another_decoder_traced_them(name: str) -> None:
         assert abs(frame.time * 1000 - int(said["pts"])) <= 1  # it adds up whole milliseconds
         assert frame.rate == int(said["rate"])
         intra = settings if settings.intra else intra
-        assert intra is not None
         assert intra.frame_rate is not None
         rate = intra.frame_rate
         assert f"{rate.frame_rate}/{rate.seconds}/{rate.frequency_offset}" == said["fr"]
@@ -125,7 +122,6 @@ def test_planes_as_another_decoder_traced_them(name: str) -> None:
         assert quants == [int(word) for word in words[at + 1 : at + 3]]
         rest = dict(zip(words[at + 3 :: 2], words[at + 4 :: 2], strict=True))
         part = settings.face or settings.body
-        assert part is not None
         assert part.gender == int(rest["gender"])
         assert part.coding_type == int(rest["coding"])
         if settings.face is not None:

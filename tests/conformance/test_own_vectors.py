@@ -1,7 +1,5 @@
 """The vectors that come with fba: complete, reproducible, passed, and worth something."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

@@ -1,7 +1,5 @@
 """Other decoders and encoders under test: right ones, and those that hang, crash or write nonsense."""
 
-from __future__ import annotations
-
 import os
 import select
 import sys

@@ -1,7 +1,5 @@
 """The textbook arithmetic coder: worked by hand, against a dense model, and there and back."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

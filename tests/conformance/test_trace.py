@@ -1,7 +1,5 @@
 """The trace of streams made by hand, bit by bit from the syntax tables."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """The independent reader against vectors of other programs: every plane, every value, every bit count."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from functools import cache

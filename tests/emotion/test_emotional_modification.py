@@ -1,7 +1,5 @@
 """`emote`: moods on a performance; lips that touch, lids that close, limits, times."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """The figures that come with the library."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import numpy as np

@@ -1,7 +1,5 @@
 """C3D files of six makers, and made ones, read as ezc3d and c3d read them."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Numbers that no honest file has: refused with their place, never another exception."""
 
-from __future__ import annotations
-
 import json
 import struct
 import wave

@@ -1,7 +1,5 @@
 """Cut and arbitrary texts: an error of ours, or a result. Mutated ones: tests/fuzz."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 

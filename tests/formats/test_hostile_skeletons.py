@@ -1,7 +1,5 @@
 """Skeletons that are damaged or meant to hurt: an error that names the place, or what is there and a word."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from fractions import Fraction
@@ -142,9 +140,7 @@ def split(whole: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [
-        (split, "has several skeletons; 'HumanoidRoot' is read, the others are left out: vl5"),
-    ],
+    [(split, "has several skeletons; 'HumanoidRoot' is read, the others are left out: vl5")],
 )
 def test_the_rest_of_a_damaged_skeleton_is_read_with_a_warning(
     tmp_path: Path, bones: bytes, change: Callable[[dict[str, Any]], None], message: str
@@ -153,7 +149,6 @@ def test_the_rest_of_a_damaged_skeleton_is_read_with_a_warning(
     path.write_bytes(edited(bones, change))
     with pytest.warns(FbaWarning, match=message):
         body = fba.read(path).body
-    assert body is not None
     knee = body.values[:, bap_numbers()["l_knee_flexion"] - 1]
     # feet are kept on the ground with what is left, so the knee bends a little more or less
     assert np.abs(knee - -10_000 * np.arange(FRAMES)).max() <= 5000
@@ -168,7 +163,6 @@ def test_a_shoulder_is_found_by_where_it_hangs(tmp_path: Path, bones: bytes) -> 
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             body = fba.read(path, plant=False).body
-        assert body is not None
         values.append(body.values)
     apart = np.abs(values[0] - values[1]).max(axis=0)
     apart[[bap_numbers()[f"{side}_metatarsal_flexion"] - 1 for side in "lr"]] = 0  # the ground bends toes

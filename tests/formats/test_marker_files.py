@@ -1,7 +1,5 @@
 """Captures of markers in every format: what is written comes back, damage is an error."""
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import replace
 from fractions import Fraction
@@ -31,7 +29,6 @@ def cloud(markers: int = 5, frames: int = 12) -> MarkerMotion:
 
 def read(path: Path, **options: object) -> MarkerMotion:
     reader = format_of(path).read_face
-    assert reader is not None
     return reader(path, **options)
 
 
@@ -132,7 +129,6 @@ def test_errors_name_the_fault_of_a_file(
 ) -> None:
     path = marker_files.write(tmp_path, name, cloud())
     reader = format_of(path).read_face
-    assert reader is not None
     data = path.read_bytes()
     assert old in data
     path.write_bytes(data.replace(old, new))
@@ -148,7 +144,6 @@ def test_errors_name_the_fault_of_a_file(
 def test_damage_is_an_error_of_ours(tmp_path: Path, name: str) -> None:
     path = marker_files.write(tmp_path, name, cloud(4, 5))
     reader = format_of(path).read_face
-    assert reader is not None
     data = bytearray(path.read_bytes())
     random = np.random.default_rng(len(name))
     for _ in range(60):

@@ -1,7 +1,5 @@
 """Which format a file is in, what its options are, and everything that is no such file."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import io
@@ -203,8 +201,6 @@ def test_merge_joins_by_frame_number() -> None:
     joined = merge(performance(body=False, first=1), performance(face=False, first=2))
     assert joined.index.tolist() == [1, 2, 3, 4]
     assert joined.name == "face"
-    assert joined.face is not None
-    assert joined.body is not None
     assert joined.face.mask.any(axis=1).tolist() == [True, True, True, False]
     assert joined.body.mask.any(axis=1).tolist() == [False, True, True, True]
     assert joined.face.values[:, 5].tolist() == [30, 30, 30, 0]

@@ -1,7 +1,5 @@
 """A face and a body on one clock: time codes, offsets, rates, and what only one of them covers."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -37,8 +35,6 @@ def body(seconds: float = 4.0, rate: int = 60, start: float | None = None) -> Re
 
 def difference(animation: Animation) -> float:
     """Return by how many seconds the body begins after the face, as their values say."""
-    assert animation.face is not None
-    assert animation.body is not None
     both = animation.face.mask[:, JAW] & animation.body.mask[:, TURN]
     late = animation.face.values[both, JAW] / 100 - animation.body.values[both, TURN] / 1000
     assert np.ptp(late) < 0.011  # one unit of the jaw
@@ -61,7 +57,6 @@ def test_an_offset(later: float, first: str) -> None:
     expected = later if first == "face" else -later
     assert difference(result.animation) == pytest.approx(expected, abs=0.0045)
     assert int(result.animation.index[0]) == 0
-    assert result.animation.body is not None
     turns = result.animation.body.values[result.body_rows, TURN]
     np.testing.assert_array_equal(turns, body().animation.body.values[:, TURN])  # type: ignore[union-attr]
 
@@ -86,8 +81,6 @@ def test_frames_that_only_one_recording_covers() -> None:
     result = join(face(2.0), body(2.0), offset=1.0)
     animation = result.animation
     assert len(animation) == 180
-    assert animation.face is not None
-    assert animation.body is not None
     assert np.flatnonzero(animation.face.mask[:, JAW]).tolist() == list(range(120))
     assert np.flatnonzero(animation.body.mask[:, TURN]).tolist() == list(range(60, 180))
     assert (result.body_rows, result.body_lead) == (slice(60, 180), 0)

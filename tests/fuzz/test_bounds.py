@@ -1,7 +1,5 @@
 """The command that runs compiled code with its bounds checked, and what compiled functions say of theirs."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

@@ -4,8 +4,6 @@ The checks of `tools.fuzz` say what must hold of what was read. tests/fuzz/test_
 each reader's files are cut and changed, and values of glTF documents replaced.
 """
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable, Iterator

@@ -3,8 +3,6 @@
 `./dev fuzz` and the fuzz stage of `.ci/run` try many more.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import json
@@ -155,7 +153,7 @@ READING = {
     "persona": ("fba.persona._persona", "fba.persona.recognition._archive"),
     "live": (
         "fba.live._protocols.livelink", "fba.live._protocols.ifacialmocap", "fba.live._protocols.vtube",
-        "fba.live._protocols.vmc", "fba.live._protocols._osc",
+        "fba.live._protocols.vmc",
     ),
     "face": ("fba.face.gltf._reading",),
     "body": ("fba.body._storage",),

@@ -1,7 +1,5 @@
 """Fits of points to points, against motions that are known and against SciPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial import procrustes

@@ -1,7 +1,5 @@
 """Damaged and hostile glTF files: one clear error that names the place, soon and without much memory."""
 
-from __future__ import annotations
-
 import json
 import os
 import struct

@@ -1,7 +1,5 @@
 """Packed geometry: meshopt's streams after the examples of its specification, Draco's by its own encoder."""
 
-from __future__ import annotations
-
 import json
 import struct
 import sys

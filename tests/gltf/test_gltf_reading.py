@@ -1,7 +1,5 @@
 """What a glTF file says, as arrays: numbers follow from the description of the format."""
 
-from __future__ import annotations
-
 import base64
 import json
 import warnings
@@ -49,7 +47,6 @@ def test_attributes_may_be_interleaved(tmp_path: Path) -> None:
     sheet.json["accessors"] = [common, common | {"byteOffset": 12}]
     primitive = read_primitive(sheet.show({"attributes": {"POSITION": 0, "NORMAL": 1}}), tmp_path)
     assert primitive.positions.tolist() == CORNERS
-    assert primitive.normals is not None
     assert primitive.normals.tolist() == [[9, 8, 7], [6, 5, 4], [3, 2, 1]]
     assert primitive.triangles.tolist() == [[0, 1, 2]]  # no indices: as they come
 
@@ -68,7 +65,6 @@ def test_scaled_integers(tmp_path: Path, kind: str, raw: list[int], meant: list[
     primitive = sheet.triangle()
     primitive["attributes"]["COLOR_0"] = sheet.array([raw] * 3, kind, normalized=True)
     colours = read_primitive(sheet.show(primitive), tmp_path).colours
-    assert colours is not None
     assert colours.tolist() == [pytest.approx(meant, abs=1e-7)] * 3
 
 
@@ -138,7 +134,6 @@ def test_morph_targets_have_the_names_of_the_extras(tmp_path: Path) -> None:
     assert found.morph_names == ("target 0", "target 1")
     assert found.weights == (0.25, 1.0)
     first, second = found.primitives[0].morphs
-    assert first is not None
     assert first.tolist() == [[0, 0, 0], [0, 0, 0], [0, 0, 4]]
     assert second is None
     mesh["extras"] = {"targetNames": ["one"]}
@@ -204,8 +199,6 @@ def test_skins(tmp_path: Path) -> None:
     assert (skin.name, skin.joints) == ("rig", (1, 2))
     assert skin.inverse_bind.tolist() == [np.eye(4).tolist(), matrix.tolist()]
     found = gltf.meshes[0].primitives[0]
-    assert found.joints is not None
-    assert found.weights is not None
     assert (found.joints[0].tolist(), found.weights[0].tolist()) == ([1, 0, 0, 0], [1, 0, 0, 0])
     sheet.json["nodes"][0] |= {"skin": 0}
     sheet.json["skins"][0] = {"joints": [1]}

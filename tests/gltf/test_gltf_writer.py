@@ -1,7 +1,5 @@
 """Documents that the builder writes, read back by the reader, and byte by byte."""
 
-from __future__ import annotations
-
 import json
 import struct
 from pathlib import Path

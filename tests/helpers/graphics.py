@@ -4,8 +4,6 @@ Where something is missing they are skipped, and the end of the run says how man
 environment variable FBA_REQUIRE_GRAPHICS set, as in continuous integration, they fail instead.
 """
 
-from __future__ import annotations
-
 import os
 from functools import cache
 from importlib import import_module

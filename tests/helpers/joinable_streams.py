@@ -1,7 +1,5 @@
 """A performance whose stream has many I planes at which decoding can begin."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import fba

@@ -1,7 +1,5 @@
 """Faces and bodies as captures and editors make them, drawn at random."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

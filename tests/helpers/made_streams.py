@@ -4,8 +4,6 @@
 mark and without it.
 """
 
-from __future__ import annotations
-
 import sys
 from collections import Counter
 from collections.abc import Iterator

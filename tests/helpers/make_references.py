@@ -7,8 +7,6 @@ only says how far what is drawn now is from the references; with GALLIUM_DRIVER=
 that is how far another rasteriser is.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Windows on a virtual display, for tests."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

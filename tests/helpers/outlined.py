@@ -1,7 +1,5 @@
 """Two short performances whose outlines are looked for: an arm that rises, a head that turns."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fba import Animation, BodyTrack, FaceTrack

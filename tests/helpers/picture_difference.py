@@ -6,8 +6,6 @@ things hide in these: a change in one small place, which more blur tells from an
 that is off by a few hundredths, which the median of a neighbourhood shows, as edges do not count in it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

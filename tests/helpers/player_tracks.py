@@ -1,7 +1,5 @@
 """Tracks for the player's tests, from what each frame sends."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fba.animation import BodyTrack, FaceTrack

@@ -8,8 +8,6 @@ change what was imported (`NUMBA_...`, `PYTHON...`, `FBA_...`), or a Python with
 is started as usual.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import json
@@ -64,7 +62,6 @@ def ready_programs() -> Iterator[Path]:
         command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, start_new_session=True
     )
     try:
-        assert server.stdout is not None
         assert server.stdout.readline() == b"ready\n", "the ready programs did not start"
         settings = {
             key: value for key, value in os.environ.items() if key.startswith(("NUMBA", "PYTHON", "FBA"))

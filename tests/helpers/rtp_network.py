@@ -1,7 +1,5 @@
 """Streams in packets, a network that loses, overtakes and doubles them, and what a receiver makes of it."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterable, Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """A clock that tests set."""
 
-from __future__ import annotations
-
 
 class Clock:
     """Seconds from any origin, as `Transport` and `Session` take them: `now`, until it is set to another."""

@@ -1,7 +1,5 @@
 """Sound files with one click, and where the click is in a film."""
 
-from __future__ import annotations
-
 import wave
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The default person in motion, written as BVH text in the conventions of many makers."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from functools import cache
@@ -69,15 +67,8 @@ class Maker:
 def truth() -> tuple[Float64, tuple[str, ...]]:
     """Matrices (T, J, 4, 4) of somebody who walks, looks around and moves their hands, and the joints."""
     walk = gait.walk(cycles=1, rate=RATE)
-    assert walk.body is not None
     values = np.array(walk.body.values[:FRAMES])
-    for joint in (
-        "sacroiliac",
-        "subtalar",
-        "midtarsal",
-        "acromioclavicular",
-        "sternoclavicular",
-    ):
+    for joint in ("sacroiliac", "subtalar", "midtarsal", "acromioclavicular", "sternoclavicular"):
         for bap in baps():  # joints that most makers lack stand still
             if joint in bap.joint:
                 values[:, bap.number - 1] = 0
@@ -93,7 +84,6 @@ def truth() -> tuple[Float64, tuple[str, ...]]:
     skeleton = Skeleton.default()
     matrices = BapSolver(skeleton).pose(values)
     lowest = lowest_sole(skeleton, matrices)
-    assert lowest is not None
     matrices[:, :, 1, 3] -= lowest[:, None]  # on the ground in all frames
     return matrices, skeleton.names
 

@@ -1,7 +1,5 @@
 """Known heads with shapes of their own motion, written as glTF in the conventions of many makers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache

@@ -1,7 +1,5 @@
 """Streams over real sockets of the loopback, and what is said where there is none."""
 
-from __future__ import annotations
-
 import random
 import socket
 import threading

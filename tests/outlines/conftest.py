@@ -1,7 +1,5 @@
 """An index of two short performances, drawn once."""
 
-from __future__ import annotations
-
 import pytest
 
 from fba.outlines import Choice, Index, build_index

@@ -1,7 +1,5 @@
 """The earth mover's distance beside linear programming, bounds below it, and searches that use them."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The index: what is found in it, its file, and files that are none."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile
@@ -76,10 +74,7 @@ def test_what_is_found_becomes_an_animation(index: Index) -> None:
     hits = [index.search(index.silhouette(pose * 8), 1)[0] for pose in (0, 3, 5, 7)]
     animation = index.animation(hits, Fraction(10))
     assert (animation.rate, len(animation)) == (10, 4)
-    assert animation.body is not None
-    assert animation.face is not None
     source = raising().body
-    assert source is not None
     assert np.array_equal(animation.body.values[:3], source.values[[0, 3, 5]])
     assert np.array_equal(animation.body.mask[:3], source.mask[[0, 3, 5]])
     assert not animation.body.mask[3].any()

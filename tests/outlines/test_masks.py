@@ -1,7 +1,5 @@
 """Figures cut out of pictures: transparent and plain backgrounds, and pictures without a figure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -68,16 +66,8 @@ def test_specks_noise_and_lossy_compression_do_not_matter(drawn: Draw) -> None:
     ("boxes", "settings", "text"),
     [
         ((), {}, PLAIN),
-        (
-            (),
-            {"mode": "RGBA", "paper": (9, 9, 9, 200)},
-            PLAIN,
-        ),
-        (
-            (),
-            {"mode": "RGBA", "paper": (0, 0, 0, 0)},
-            PLAIN,
-        ),
+        ((), {"mode": "RGBA", "paper": (9, 9, 9, 200)}, PLAIN),
+        ((), {"mode": "RGBA", "paper": (0, 0, 0, 0)}, PLAIN),
         ((), {"size": (1, 1)}, "no figure before a background"),
         (((0, 0, 20, 20), (60, 30, 80, 50), (90, 0, 100, 40)), {}, "shows 3 figures that do not touch"),
         (((50, 50, 58, 56),), {}, "9 x 7 pixels large; its longer side needs 16"),

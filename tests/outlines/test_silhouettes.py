@@ -1,7 +1,5 @@
 """Silhouettes of meshes, beside exact areas and the formulas of a camera."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull

@@ -1,7 +1,5 @@
 """Trees, their paths and embeddings: the source's worked example, and distances along random trees."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree

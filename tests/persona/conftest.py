@@ -1,7 +1,5 @@
 """An actor whose style is known, a user without one, and the actor's Persona; made once."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

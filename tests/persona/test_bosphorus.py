@@ -1,7 +1,5 @@
 """Scans in the layout of Bosphorus, written here: names, clouds, landmarks, depth maps and examples."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

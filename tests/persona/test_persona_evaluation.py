@@ -1,7 +1,5 @@
 """`python -m tools.persona.evaluation`: the table of docs/persona.md."""
 
-from __future__ import annotations
-
 import pytest
 
 from tools.persona import evaluation

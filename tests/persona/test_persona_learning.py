@@ -1,7 +1,5 @@
 """Learning an actor's way, and playing a user's performance in it."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -61,7 +59,6 @@ def test_play_shows_the_actors_way(user: Act, persona: Persona) -> None:
     """The actor's smile is lopsided: the left corner rises more. The user's is not."""
     own, acted = animate_as(user.face, None), animate_as(user.face, persona)
     assert len(acted) == len(own) == len(user.face)
-    assert acted.face is not None
     assert own.face is not None
     assert set(np.flatnonzero(acted.face.mask[0]) + 1) == {*shown_numbers(), 48, 49, 50}
     mine, his = (at_apex(user, one.face.values, "E_HAPPY") for one in (own, acted))
@@ -76,7 +73,6 @@ def test_play_shows_the_actors_way(user: Act, persona: Persona) -> None:
 def test_the_users_own_faps_are_those_that_were_performed(user: Act) -> None:
     """Tracked points, registered, become FAPs of the user's own FAPU: those that moved the face."""
     track = animate_as(user.face, None).face
-    assert track is not None
     jaw = at_apex(user, track.values, "LFAU_27")
     true = at_apex(user, user.faps, "LFAU_27")
     for fap in (5, 10, 52):
@@ -126,7 +122,6 @@ def test_frame_by_frame_is_as_in_one_piece(user: Act, persona: Persona) -> None:
         assert live.ready
         if means == "curves":
             whole = animate_as(user.face, persona, means=means).face
-            assert whole is not None
             frames = [60, 100, 140]
             np.testing.assert_allclose([shown[n] for n in frames], whole.values[frames], atol=0.51)
         kept = live.push(np.full((64, 2), np.nan), np.zeros(3))
@@ -147,7 +142,6 @@ def test_frames_without_a_face_are_bridged(user: Act, persona: Persona) -> None:
     points = user.face.points.copy()
     points[60:66] = np.nan
     found = animate_as(replace(user.face, points=points), persona)
-    assert found.face is not None
     jump = np.abs(np.diff(found.face.values[58:68, 11])).max()
     assert jump < 100
     with pytest.warns(FbaWarning, match="6 have no face"):
@@ -195,5 +189,4 @@ def test_the_report_draws_masks_and_plots(actor: Act, persona: Persona) -> None:
     assert "E_HAPPY" in page
     assert "Missing" in page
     told = re.search(r"of the left side relative to the right: mouth ([\d.]+), ", page)
-    assert told is not None
     assert float(told.group(1)) > 1.3  # the actor's left side moves more

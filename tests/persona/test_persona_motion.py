@@ -1,7 +1,5 @@
 """Amplitude, speed and sides of a face's motion: measured, stored, given to another person's performance."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -159,7 +157,6 @@ def test_lids_and_lips_that_shut_stay_shut(style: Style) -> None:
     persona = learn([act(all_contents(4, np.random.default_rng(5), contents), style, seed=7).face])
     user = act([("LFAU_27", 0.9), ("UFAU_43", 1.0), ("viseme 1 (p b m)", 1.0), ("LFAU_27", 0.9)], seed=99)
     shown = animate_as(user.face, persona).face
-    assert shown is not None
     moment = dict(user.apex)
     lids = shown.values[moment["UFAU_43"], 18:22]
     assert lids[[0, 2]].sum() > 900  # 1024 is an eye that is shut
@@ -224,8 +221,6 @@ def test_live_comes_to_the_same_amplitude(
     shown = [live.push(one, turn) for one, turn in zip(face.points, face.angles, strict=True)]
     whole = animate_as(face, persona).face
     plain = animate_as(face, persona, means="curves").face
-    assert whole is not None
-    assert plain is not None
     first = len(shown) // 2
     late = [np.zeros(68) if one is None else one for one in shown[first:]]
     sizes = [

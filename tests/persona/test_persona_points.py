@@ -1,7 +1,5 @@
 """The mask, what lays points on it, distances of masks, and other trackers' points."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

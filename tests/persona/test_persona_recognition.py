@@ -1,7 +1,5 @@
 """Classes, components and networks; and what the trained default promises."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bodies within a tolerance: what is sent is measured here, on the decoded stream, by the joints' points."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -44,7 +42,6 @@ def body(values: np.ndarray, rate: int = 25) -> fba.Animation:
 def off(source: np.ndarray, data: bytes) -> np.ndarray:
     """Millimetres (T, J, 3) by which points 3 cm along each joint's axes are off, between frames in lines."""
     decoded = decode(data, bap_steps="visage")
-    assert decoded.body is not None
     frames = np.arange(len(source))
     assert decoded.index[-1] == frames[-1]
     shown = np.stack([np.interp(frames, decoded.index, column) for column in decoded.body.values.T], axis=1)
@@ -62,7 +59,6 @@ def test_a_body_stays_within_a_centimetre_in_far_fewer_bytes(gesture: tuple[byte
     data, near = gesture
     measured = off(GESTURE, data)
     assert measured.max() <= 10.0
-    assert near.body is not None
     assert near.body.largest * 1000 == pytest.approx(measured.max(), abs=1e-6)
     assert near.body.percentile_99 * 1000 == pytest.approx(np.percentile(measured.max(axis=2), 99), abs=1e-6)
     assert len(data) < 0.7 * min(
@@ -72,9 +68,7 @@ def test_a_body_stays_within_a_centimetre_in_far_fewer_bytes(gesture: tuple[byte
     )
 
 
-def test_frames_that_a_player_can_interpolate_are_left_out(
-    gesture: tuple[bytes, NearLossless],
-) -> None:
+def test_frames_that_a_player_can_interpolate_are_left_out(gesture: tuple[bytes, NearLossless]) -> None:
     data, near = gesture
     sent = len(decode(data, bap_steps="visage"))
     assert sent == len(GESTURE) - near.left_out
@@ -94,7 +88,6 @@ def test_feet_that_stand_stay_within_their_own_tolerance() -> None:
     assert stands.mean() > 0.9
     data, near = encode_within_tolerance(body(sway), Tolerance(foot=0.002), VISAGE)
     measured = off(sway, data).max(axis=2)
-    assert near.body is not None
     assert 0 < near.body.foot <= 0.002
     for side, foot in zip("lr", stands, strict=True):  # above the heel, and turned against it
         assert measured[foot, skeleton.number(f"{side}_subtalar")].max() < 4.0
@@ -145,7 +138,6 @@ def test_a_face_beside_a_body_keeps_every_frame() -> None:
     data, near = encode_within_tolerance(both, Tolerance(), VISAGE)
     assert near.left_out == 0
     assert off(GESTURE, data).max() <= 10.0
-    assert near.face is not None
     assert near.face.largest <= 0.0005
 
 
@@ -153,7 +145,6 @@ def test_user_defined_baps_are_kept() -> None:
     values = GESTURE.copy()
     values[:, 200] = np.arange(len(values)) * 7
     decoded = decode(encode_within_tolerance(body(values), Tolerance(), VISAGE)[0], bap_steps="visage").body
-    assert decoded is not None
     np.testing.assert_array_equal(decoded.values[:, 200], values[:, 200])
 
 

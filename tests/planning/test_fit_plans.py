@@ -1,7 +1,5 @@
 """Plans for receivers with a head whose interpolation table (FIT) gives FAPs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -76,7 +74,6 @@ def moving(**paths: np.ndarray) -> Animation:
 def sent_names(animation: Animation, head: FaceSettings | None) -> list[set[str]]:
     """Names of the FAPs sent in each segment."""
     plan = plan_compact(animation, model=head)
-    assert plan.animation.face is not None
     masks = [plan.animation.face.mask[one.start] for one in plan.segments]
     return [{faps()[column].name for column in np.flatnonzero(mask)} for mask in masks]
 
@@ -113,7 +110,6 @@ def test_a_mate_that_the_table_needs_is_sent_and_one_that_it_gives_is_not_copied
 def test_a_fap_at_0_that_overrides_the_table_is_sent() -> None:
     table = InterpolationTable([Link(["open_jaw"], {"push_t_lip": share("open_jaw", 1.0)})])
     animation = moving(open_jaw=np.arange(LENGTH) * 4)
-    assert animation.face is not None
     mask = animation.face.mask.copy()
     mask[:, fap_numbers()["push_t_lip"] - 1] = True
     animation = replace(animation, face=FaceTrack(animation.face.values, mask))

@@ -1,7 +1,5 @@
 """Streams for a head that computes most FAPs: what they send, what the head shows, and how far it is off."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

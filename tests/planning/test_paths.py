@@ -1,7 +1,5 @@
 """Paths of one parameter: within their bounds, and never costlier than a dead zone."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

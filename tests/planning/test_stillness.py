@@ -1,7 +1,5 @@
 """Bodies whose joints and feet rest after decoding as they do in the capture, measured on decoded streams."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,9 +37,7 @@ def one_bap(values: np.ndarray, column: int = WRIST) -> fba.Animation:
 
 def held(animation: fba.Animation, options: EncoderOptions = VISAGE) -> np.ndarray:
     """What `hold_still` makes of the BAPs, (T, 296)."""
-    track = hold_still(animation, options).body
-    assert track is not None
-    return track.values
+    return hold_still(animation, options).body.values
 
 
 def steps_of(options: EncoderOptions) -> np.ndarray:
@@ -53,7 +49,6 @@ def standing_soles(animation: fba.Animation) -> tuple[np.ndarray, np.ndarray]:
 
     They stand where the foot does and goes by less than 12 mm in 0.2 s.
     """
-    assert animation.body is not None
     solver, rate = BapSolver(), float(animation.rate)
     skeleton, matrices = solver.skeleton, solver.pose(animation.body.values.astype(float))
     points = []
@@ -81,9 +76,7 @@ def test_a_joint_that_rests_between_two_levels_stays_on_one() -> None:
     rng = np.random.default_rng(1)
     for count in (200, 5000):
         animation = one_bap(np.rint(20.45 * STEP + rng.normal(0, 0.05 * STEP, count)))
-        rounded = quantise(animation, VISAGE).body
-        assert rounded is not None
-        assert np.count_nonzero(np.diff(rounded.values[:, WRIST])) > count / 10
+        assert np.count_nonzero(np.diff(quantise(animation, VISAGE).body.values[:, WRIST])) > count / 10
         assert not np.diff(held(animation)[:, WRIST]).any()
 
 
@@ -121,7 +114,6 @@ def test_angles_continue_past_half_a_turn() -> None:
     animation = one_bap(np.rint((values + turn / 2) % turn - turn / 2), TURN)
     assert np.abs(held(animation)[:, TURN] - values).max() < 2 * STEP
     literal = replace(VISAGE, clamp=False)  # each value as it is
-    assert animation.body is not None
     assert np.abs(held(animation, literal) - animation.body.values).max() < STEP
 
 
@@ -136,11 +128,9 @@ def test_animations_without_quantised_bodies_stay_as_they_are() -> None:
 def test_unsent_values_do_not_matter() -> None:
     """A hand that is sent for half of the time only is held as long as it is, and its mask stays."""
     animation = one_bap(np.full(10, 1000.0))
-    assert animation.body is not None
     mask = animation.body.mask.copy()
     mask[5:] = False
     result = hold_still(replace(animation, body=fba.BodyTrack(animation.body.values, mask)), VISAGE).body
-    assert result is not None
     assert (result.values[:, WRIST] == np.where(np.arange(10) < 5, round(1000 / STEP) * STEP, 0)).all()
     assert (result.mask == mask).all()
 

@@ -1,7 +1,5 @@
 """Who gets which message; and when, by a clock that only the test moves."""
 
-from __future__ import annotations
-
 import json
 from collections import defaultdict
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """The client in the page, in node, with a connection that the test plays."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil
@@ -71,9 +69,7 @@ def test_frames_from_the_start_and_from_an_i_plane_after_losses(tmp_path: Path) 
     times = [number / 25 + (6.4 if number > 12 else 0) for number in expected]
     assert [time for time, _ in frames] == pytest.approx(times)
     for (_, values), number in zip(frames, expected, strict=True):
-        face = FRAMES[number].face
-        assert face is not None
-        np.testing.assert_array_equal(values, face.values[0])
+        np.testing.assert_array_equal(values, FRAMES[number].face.values[0])
 
 
 def test_it_opens_again_after_pauses_that_grow(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Streams as planes: joined they are the stream, and a decoder may begin wherever one says so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -56,7 +54,6 @@ def test_a_viewer_may_begin_at_every_plane_that_opens(size: int) -> None:
     assert joined.startswith(opening)
     assert data.startswith(joined[len(opening) :])  # all but the mark
     whole = fba.decode(joined)
-    assert whole.body is not None
     np.testing.assert_array_equal(whole.body.values, np.concatenate([one.body.values for one in frames]))
 
 
@@ -78,7 +75,6 @@ def test_an_i_plane_that_leaves_something_in_force_opens_nothing() -> None:
     """A body that only the first of the I planes carries: the others would lack it."""
     whole = performance()
     data = encode_animation(whole, JOINABLE)[0]
-    assert whole.body is not None
     shown = np.array(whole.body.mask)
     shown[10:] = False
     faces = replace(whole, body=BodyTrack(whole.body.values, shown))

@@ -89,10 +89,7 @@ def measure_points(head: FaceModel, performed: Float64, rate: int) -> dict[str, 
         take = film(head, performed=performed[::FILM], rate=rate // FILM, **options)
         size = PICTURE if take.motion.share else PICTURE * 1280
         noise = np.random.default_rng(1).normal(0, NOISE * size, take.motion.positions.shape)
-        for way, positions in (
-            ("exact", take.motion.positions),
-            ("0.3 mm", take.motion.positions + noise),
-        ):
+        for way, positions in (("exact", take.motion.positions), ("0.3 mm", take.motion.positions + noise)):
             motion = replace(take.motion, positions=positions, aspect=16 / 9)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", FbaWarning)

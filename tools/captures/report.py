@@ -17,12 +17,7 @@ from fba.formats.face_tables import livelink_udp
 from fba.parameters import faps
 from tools.captures.marked_actor import as_face, record
 from tools.captures.marker_files import MAKERS
-from tools.captures.measurement import (
-    Errors,
-    measure_animation,
-    measure_marker_file,
-    worst,
-)
+from tools.captures.measurement import Errors, measure_animation, measure_marker_file, worst
 from tools.captures.performances import speech
 from tools.captures.point_files import LAYOUTS
 from tools.captures.shaped_face import FACE_FILES, encode_file

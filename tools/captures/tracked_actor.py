@@ -34,10 +34,7 @@ FAR = 0.9
 def _between(first: str, middle: str, last: str) -> tuple[Spot, Spot]:
     """Points a third and two thirds of the way on a curve through three feature points."""
     near, far = 2 / 9, -1 / 9
-    return (
-        ((first, near), (middle, 8 / 9), (last, far)),
-        ((first, far), (middle, 8 / 9), (last, near)),
-    )
+    return (((first, near), (middle, 8 / 9), (last, far)), ((first, far), (middle, 8 / 9), (last, near)))
 
 
 def _spots_68() -> dict[int, Spot]:

@@ -80,7 +80,7 @@ def compare(
     lost, tears = path_measures.find_tears(motion.positions[:count] * metres, rate)
     pieces = _pieces(count, most)
     floor = find_floor(
-        (figure.source_figure(motion.select(piece), mapped, up, metres) for piece in pieces), rate
+        (figure.source_figure(motion.select(piece), mapped, up, metres) for piece in pieces), rate, level
     )
     by_part: dict[tuple[str, str], list[Difference]] = {}
     for piece in pieces:
@@ -88,7 +88,7 @@ def compare(
         source = figure.source_figure(motion.select(piece), mapped, up, metres)
         result = figure.result_figure(solver, baps)
         soles = sole_heights(solver, baps)
-        for row in _measure(source, result, rest, neutral, soles, rate, level, floor):
+        for row in _measure(source, result, rest, neutral, soles, rate, floor):
             kept = row._replace(values=np.where(lost[piece], np.nan, row.values))
             by_part.setdefault((row.name, row.part), []).append(_difference(kept, rate, piece.start))
     differences = [
@@ -126,7 +126,6 @@ def _measure(
     neutral: Figure,
     soles: dict[str, Float64],
     rate: float,
-    level: float | None,
     floor: Floor,
 ) -> Iterator[Row]:
     standing = find_standing(source, rate, floor.lows)
@@ -137,7 +136,7 @@ def _measure(
     yield from pose_measures.heads(source, result, rest)
     yield from pose_measures.clavicles(source, result, neutral)
     yield from path_measures.paths(source, result)
-    yield from path_measures.floors(source, soles, standing, level, floor.ground)
+    yield from path_measures.floors(source, soles, standing, floor.level, floor.ground)
     yield from path_measures.slips(source, result, standing, rate)
     yield from path_measures.jumps(source, result)
     yield from pose_measures.leg_twists(result)

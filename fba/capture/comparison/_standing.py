@@ -23,14 +23,15 @@ class Floor(NamedTuple):
     """Where the feet of a source stand, in metres.
 
     lows: by side, the largest height at which a foot may stand. ground: the usual height at which feet stand;
-    None if they never do.
+    None if they never do. level: height of the person's floor; None where it has none.
     """
 
     lows: dict[str, float]
     ground: float | None
+    level: float | None
 
 
-def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
+def find_floor(sources: Iterable[Figure], rate: float, level: float | None = None) -> Floor:
     """Return where feet stand in all pieces of a motion together: in a piece they may never stand."""
     still: dict[str, list[Bool]] = {side: [] for side in SIDES}
     ends: dict[str, list[Float64]] = {side: [] for side in SIDES}
@@ -50,7 +51,7 @@ def find_floor(sources: Iterable[Figure], rate: float) -> Floor:
         for side, at in heights.items()
     ]
     together = np.concatenate(standing) if standing else np.zeros(0)
-    return Floor(lows, float(np.median(together)) if len(together) else None)
+    return Floor(lows, float(np.median(together)) if len(together) else None, level)
 
 
 def find_standing(source: Figure, rate: float, lows: Mapping[str, float]) -> dict[str, Bool]:

@@ -23,7 +23,7 @@ from fba.capture.markers._stabilisation import follow_head, relate_poses, remove
 from fba.capture.markers._targets import LOWER_LIDS, PUPILS, RIGID
 from fba.capture.markers.marker_maps import check_map, find_map
 from fba.choices import Gaze
-from fba.errors import FbaWarning, ModelError, OptionError
+from fba.errors import ModelError, OptionError, warn
 from fba.face import FaceModel, Fapu
 from fba.face.gaze import limit_gaze
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, PITCH_EYE, YAW_EYE
@@ -397,7 +397,7 @@ def _warn_of_repairs(unit: str, where: Registration) -> None:
     if where.astray:
         repairs.append(f"far from their places on a face, and left out: {list_names(where.astray)}")
     for text in repairs:
-        warnings.warn(text, FbaWarning, stacklevel=4)
+        warn(text, stacklevel=4)
 
 
 def _warn_of_exchanges(exchanges: list[Exchange]) -> None:
@@ -405,8 +405,8 @@ def _warn_of_exchanges(exchanges: list[Exchange]) -> None:
     if exchanges:
         first = exchanges[0]
         more = f", and {len(exchanges) - 1} more times in the take" if len(exchanges) > 1 else ""
-        warnings.warn(
+        warn(
             f"markers {first.one} and {first.other} take each other's names in frame {first.frame}{more}: "
             "exchanged from there on",
-            FbaWarning, stacklevel=4,
-        )  # fmt: skip
+            stacklevel=4,
+        )

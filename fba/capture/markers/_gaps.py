@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from fba.arrays import Bool, Float64
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.name_maps import list_names
 
 MAX_SPLINE_SECONDS = 0.2
@@ -34,10 +33,10 @@ def often_seen(names: tuple[str, ...], seen: Bool) -> tuple[str, ...]:
     often = seen.mean(axis=0) >= MIN_SEEN_SHARE
     rare = [name for name, kept in zip(names, often, strict=True) if not kept]
     if rare:
-        warnings.warn(
+        warn(
             f"seen in less than {MIN_SEEN_SHARE:.0%} of the frames, and left out: {list_names(rare)}",
-            FbaWarning, stacklevel=4,
-        )  # fmt: skip
+            stacklevel=4,
+        )
     return tuple(name for name in names if name not in rare)
 
 
@@ -121,8 +120,8 @@ def _as_neighbours(
 def warn_of_gaps(filled: Filled) -> None:
     """Warn of long gaps."""
     if filled.long:
-        warnings.warn(
+        warn(
             f"{filled.long} long gaps are filled by neighbouring markers, the longest {filled.longest:.2f} s "
             f"of {filled.marker}" + (f"; {filled.short} short ones by splines" if filled.short else ""),
-            FbaWarning, stacklevel=4,
-        )  # fmt: skip
+            stacklevel=4,
+        )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,15 +18,9 @@ from fba.capture.points._lifting import lift
 from fba.capture.points._motion import PointMotion
 from fba.capture.points._neutral import find_rests
 from fba.capture.points.picture import face_misfit, upright_points
-from fba.capture.points.places import (
-    check_places,
-    fill_points,
-    find_still,
-    point_places,
-    take_points,
-)
+from fba.capture.points.places import check_places, fill_points, find_still, point_places, take_points
 from fba.choices import Gaze
-from fba.errors import FbaWarning, ModelError, OptionError
+from fba.errors import ModelError, OptionError, warn
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.sampling import find_gaps, interpolate
@@ -207,10 +200,10 @@ def _warn_of_unseen(motion: PointMotion) -> None:
     if seen.all():
         return
     longest = max((length for _, length in find_gaps(motion.times[seen], motion.rate)), default=0.0)
-    warnings.warn(
+    warn(
         f"{int((~seen).sum())} of {len(seen)} frames have no face; they are bridged, {longest:.2f} s at most",
-        FbaWarning, stacklevel=4,
-    )  # fmt: skip
+        stacklevel=4,
+    )
 
 
 def _even_sizes(points: Float64, template: Float64, still: list[int]) -> Float64:

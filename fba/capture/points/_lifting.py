@@ -61,11 +61,7 @@ class Knowledge:
 
 
 def lift(
-    points: Float64,
-    places: Mapping[str, str],
-    template: Float64,
-    times: Float64,
-    model: FaceModel,
+    points: Float64, places: Mapping[str, str], template: Float64, times: Float64, model: FaceModel
 ) -> Float64:
     """Return points (T, M, 2) with depth: float64 (T, M, 3), metres, as large as an adult's face.
 

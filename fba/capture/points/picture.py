@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture.points.poses import fit_poses
-from fba.errors import FbaWarning, ModelError, Remedy
+from fba.errors import FbaWarning, ModelError, Remedy, warn
 from fba.geometry import fit_similarity
 
 ASPECTS = {"16:9": 16 / 9, "4:3": 4 / 3, "1:1": 1.0, "3:4": 3 / 4, "9:16": 9 / 16}
@@ -58,15 +58,15 @@ def _turn_round(points: Float64, where: Mapping[str, int]) -> Float64:
             axis, how = 0, "mirrored: x is turned round"
         else:
             axis, how = 1, "upside down: y counts upwards, and is turned round"
-        warnings.warn(f"the points are {how}", FbaWarning, stacklevel=6)
+        warn(f"the points are {how}", stacklevel=6)
         points = points * np.where(np.arange(points.shape[2]) == axis, -1.0, 1.0)
     if points.shape[2] == 3 and "9.3" in where:
         eyes = points[:, [where["3.7"], where["3.12"]], 2].mean(axis=1)
         if np.nanmedian(points[:, where["9.3"], 2] - eyes) < 0:
-            warnings.warn(
+            warn(
                 "the nose is behind the eyes: depth counts towards the camera, and is turned round",
-                FbaWarning, stacklevel=6,
-            )  # fmt: skip
+                stacklevel=6,
+            )
             points = points * np.array([1.0, 1.0, -1.0])
     return points
 

@@ -9,7 +9,7 @@ from typing import get_args
 
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.choices import Assignment, Gaze, Overlap
-from fba.errors import FbaWarning, ModelError, OptionError
+from fba.errors import ModelError, OptionError, warn
 from fba.name_maps import list_names
 
 ASSIGNMENTS: tuple[Assignment, ...] = get_args(Assignment)
@@ -169,7 +169,6 @@ class MarkerMapping:
 
         Warns (FbaWarning) if the mesh has the same triangles, but its vertices were moved.
         """
-        import warnings
 
         made_for = self.made_for
         if made_for is not None:
@@ -184,10 +183,11 @@ class MarkerMapping:
                     "this one anew"
                 )
             if made_for.shape != head.shape:
-                warnings.warn(
+                warn(
                     f"{head.name}: vertices were moved since the mapping was made; it is used as it is, as "
-                    "their numbers are the same", FbaWarning, stacklevel=3,
-                )  # fmt: skip
+                    "their numbers are the same",
+                    stacklevel=3,
+                )
         number = head.skin.number
         used = set(head.skin.triangles.ravel().tolist())
         for name, marker in self.centres.items():

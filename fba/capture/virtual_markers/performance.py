@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -21,7 +20,7 @@ from fba.capture.virtual_markers.lids import Eye, find_eyes, narrow, turn_to_cam
 from fba.capture.virtual_markers.mapping import MarkerMapping
 from fba.capture.virtual_markers.weights import MarkerWeights, find_weights
 from fba.choices import Gaze
-from fba.errors import FbaWarning, ModelError
+from fba.errors import ModelError, warn
 
 MIN_FIXED = 3
 """Smallest number of fixed markers that show the head's motion."""
@@ -167,7 +166,7 @@ def perform_steady(
     centres = head.vertices[np.array(vertices, dtype=np.intp)]
     fit = lay_onto(markers.neutral[placed], centres)
     if np.linalg.det(fit.rotation) < 0:
-        warnings.warn("the capture is mirrored: x is turned round", FbaWarning, stacklevel=3)
+        warn("the capture is mirrored: x is turned round", stacklevel=3)
     scale = _measure_scale(head, mapping, markers, float(fit.scale))
     turn = fit.rotation  # from the capture's axes to the head's
     local = np.einsum("ij,tkj->tki", scale * turn, markers.local - markers.neutral)
@@ -225,10 +224,11 @@ def _measure_scale(head: MarkedHead, mapping: MarkerMapping, markers: SteadyMark
             )
     scale = wanted / apart
     if not 1 / MAX_SCALE_RATIO < scale / usual < MAX_SCALE_RATIO:
-        warnings.warn(
+        warn(
             f"by {pair[0]} and {pair[1]} the head is {scale:.3g} times as large as the actor's, by all "
-            f"markers {usual:.3g} times: are they where the mapping says?", FbaWarning, stacklevel=4,
-        )  # fmt: skip
+            f"markers {usual:.3g} times: are they where the mapping says?",
+            stacklevel=4,
+        )
     return scale
 
 

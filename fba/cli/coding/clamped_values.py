@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fba.animation import Animation
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.parameters import BapTable, bap_numbers, bap_steps, baps
 from fba.tracks import BodyTrack
 
@@ -39,10 +38,9 @@ def bring_near(animation: Animation, table: BapTable, quant: int) -> Animation:
         return animation
     values = animation.body.values.copy()
     values[:, columns] -= begin
-    warnings.warn(
+    warn(
         f"the capture begins {np.linalg.norm(begin) / 1000:.1f} m from its origin; the first plane carries "
         f"{most.min() / 1000:.1f} m; it is moved to begin at the default place, as with --origin start",
-        FbaWarning,
         stacklevel=2,
     )
     return replace(animation, body=BodyTrack(values, animation.body.mask))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +16,7 @@ from fba.cli.inputs import input_file, read_model
 from fba.cli.outputs import display_name
 from fba.cli.printing import rate_text, seconds_text
 from fba.encoder_options import PRESETS
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.limits import Limits
 from fba.parameters import BapTable
 
@@ -135,10 +134,9 @@ def _read_head(size: Size, goal: Goal) -> FaceModel | None:
     """Return the head that an option names, or None. Warns (FbaWarning) of a head without a FIT."""
     model = read_model(size.fit if goal == "fit" else size.model)
     if goal == "compact" and model is not None and model.fit is None:
-        warnings.warn(
+        warn(
             f"{size.model} has no interpolation table (FIT), which would give FAPs that are not sent; the "
             "stream is that without this model",
-            FbaWarning,
             stacklevel=2,
         )
     return model

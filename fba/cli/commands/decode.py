@@ -230,9 +230,7 @@ def command(
             raise click.UsageError("--visemes takes one stream at a time; give one input")
         listed.append(Output("--visemes", writing.visemes, text=True))
     outputs = Outputs(
-        listed,
-        [*inputs, face, writing.options.model, writing.options.body],
-        no_clobber=writing.no_clobber,
+        listed, [*inputs, face, writing.options.model, writing.options.body], no_clobber=writing.no_clobber
     )
     written_as = targets[-1].writing if targets else None
     settings: dict[str, Any] = {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -18,7 +17,7 @@ from fba.cli.map_options import MAP, Maps, Neutral, files_of, neutral_option, sp
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import STANDARD, Output, Outputs, display_name, further_output_option, output_option
 from fba.cli.printing import Progress
-from fba.errors import FbaWarning, ModelError
+from fba.errors import ModelError, warn
 
 if TYPE_CHECKING:
     from fba.capture import MarkerMotion
@@ -311,7 +310,7 @@ def _find_mapping(motion: MarkerMotion, head: MarkedHead, request: _Request) -> 
         except ModelError as error:
             if request.output is not None:
                 raise
-            warnings.warn(str(error), FbaWarning, stacklevel=2)
+            warn(str(error), stacklevel=2)
     for name, vertex in pairs.items():
         if name not in places:
             mapping = _put(mapping, head, name, vertex)

@@ -26,7 +26,7 @@ from fba.cli.outputs import (
 )
 from fba.cli.printing import Progress, colour_grade, print_json
 from fba.cli.subcommands import model_learn_fit, model_photos, model_simplify
-from fba.errors import FbaWarning
+from fba.errors import FbaWarning, warn
 
 if TYPE_CHECKING:
     from fba.arrays import Float64
@@ -370,10 +370,9 @@ def _read_points(path: Path, model: FaceModel) -> Float64:
         return xface_points(fdp)
     from fba.face.calibration import points_of_distances
 
-    warnings.warn(
+    warn(
         f"{path}: the mesh {', '.join(absent)} is not in the same folder, so positions of feature points are "
         f"unknown; only the distances {', '.join(fdp.distances)} are used",
-        FbaWarning,
         stacklevel=2,
     )
     return points_of_distances(model, fdp.distances)

@@ -63,11 +63,7 @@ def speak_live(
 
     raise_delayed()  # from here on, Ctrl-C ends the sound and not the command
     try:
-        with (
-            naming_file(STANDARD_INPUT),
-            stopping(lambda: stopped.append(True)),
-            Progress("listening", None),
-        ):
+        with naming_file(STANDARD_INPUT), stopping(lambda: stopped.append(True)), Progress("listening", None):
             for frame in frames():
                 recorder.push(emote(frame, moods) if moods else frame)
     finally:

@@ -75,11 +75,7 @@ class _Given:
 @click.argument("side", metavar="[SIDE]", type=options.FILE, required=False)
 @with_options
 def command(
-    front: Path,
-    side: Path | None,
-    target: _Target,
-    given: _Given,
-    as_json: bool = options.json_option,
+    front: Path, side: Path | None, target: _Target, given: _Given, as_json: bool = options.json_option
 ) -> None:
     """Fit the built-in head to a person in photographs, with the skin that they show; every FAP moves it.
 

@@ -150,11 +150,7 @@ def _simplified(model: FaceModel, goal: _Goal) -> tuple[FaceModel, list[dict[str
         mesh for n, mesh in enumerate(meshes) if not n or len(mesh.triangles) < len(meshes[n - 1].triangles)
     ]
     rows = [
-        {
-            "faces": len(mesh.triangles),
-            "vertices": len(mesh.positions),
-            "error_mm": 1000 * made.error(mesh),
-        }
+        {"faces": len(mesh.triangles), "vertices": len(mesh.positions), "error_mm": 1000 * made.error(mesh)}
         for mesh in meshes
     ]
     levels = [made.build(mesh) for mesh in meshes]

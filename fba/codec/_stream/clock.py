@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import warnings
 from fractions import Fraction
 
 import numpy as np
 
 from fba.arrays import Int64
 from fba.codec.settings import FrameRate, TimeCode
-from fba.errors import FbaWarning, RangeError, Remedy
+from fba.errors import RangeError, Remedy, warn
 
 _MAX_JUMP_SECONDS = 60
 """Longest jump of a time code that is taken for lost frames without other damage."""
@@ -174,10 +173,9 @@ def first_time_code(index: int, rate: Fraction) -> TimeCode | None:
         return None
     code = time_code(index, rate)
     if code is None:
-        warnings.warn(
+        warn(
             f"the animation starts at {float(index / rate):g} s, which no time code says; the stream starts "
             "at 0",
-            FbaWarning,
             stacklevel=3,
         )
     return code

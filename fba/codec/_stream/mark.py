@@ -13,13 +13,12 @@ object sequence with the same user data stand before the object: see `write_open
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import dataclass
 from zlib import crc32
 
 from fba.codec._plane import syntax
 from fba.codec._stream.checksums import CHECK_BYTES, check_of
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.parameters import BAP_STEP_TABLES, BapTable
 
 USER_DATA = 0xB2
@@ -115,10 +114,9 @@ def read_mark(content: bytes) -> MarkContent | None:
     if not end or (count is None and end < len(head)):
         problem = "a mark of the stream was cut off or is damaged"
     if table is not None and table not in BAP_STEP_TABLES:
-        warnings.warn(
+        warn(
             f"the stream says that it was made with the BAP steps {table!r}, which are not known here; those "
             f"that are: {', '.join(BAP_STEP_TABLES)}",
-            FbaWarning,
             stacklevel=2,
         )
         table = None

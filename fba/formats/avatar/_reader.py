@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -24,7 +23,7 @@ from fba.capture import (
 )
 from fba.capture.blendshapes.conversion import convert_rows
 from fba.carriage.avatar_units import AvatarUnits, UnitTrack, begins_stream, read_units
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError, warn
 from fba.face import arkit_names
 from fba.formats.avatar._container import DOCUMENT, Avatar, parents_first, read_container
 from fba.formats.avatar._names import (
@@ -117,7 +116,7 @@ def _warn_of_rest(units: AvatarUnits, path: Path) -> None:
     if units.left_out:
         listed = ", ".join(f"{count} of type {kind}" for kind, count in sorted(units.left_out.items()))
         text = f"{os.fspath(path)}: units are left out, of types or further sets that are not read: {listed}"
-        warnings.warn(text, FbaWarning, stacklevel=4)
+        warn(text, stacklevel=4)
 
 
 def _explain(units: AvatarUnits, path: Path) -> Avatar:
@@ -142,7 +141,7 @@ def _explain(units: AvatarUnits, path: Path) -> Avatar:
         )
     if FACE_PROFILE not in units.shapes.profile:
         text = f"{os.fspath(path)}: its shapes have no names; they are taken as ARKit's, in ARKit's order"
-        warnings.warn(text, FbaWarning, stacklevel=5)
+        warn(text, stacklevel=5)
     return replace(nothing, shapes=arkit_names())
 
 
@@ -170,7 +169,7 @@ class _Person:
         columns = [column for column, name in enumerate(names) if name is not None]
         if not columns:
             text = f"{os.fspath(self.path)}: no shape has one of ARKit's names; the face is left out"
-            warnings.warn(text, FbaWarning, stacklevel=4)
+            warn(text, stacklevel=4)
             return turns
         weights = np.nan_to_num(track.values[:, columns])
         known = [name for name in names if name is not None]
@@ -304,7 +303,7 @@ class _Person:
             names = [motion.names[joint] for joint in np.flatnonzero(moved)[:5]]
             listed = ", ".join(names) + (", ..." if moved.sum() > 5 else "")
             text = f"{os.fspath(self.path)}: joints keep the offsets from their parents at rest: {listed}"
-            warnings.warn(text, FbaWarning, stacklevel=5)
+            warn(text, stacklevel=5)
 
 
 def _with_root_first(order: list[int], parents: Int64, path: Path) -> list[int]:

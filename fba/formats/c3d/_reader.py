@@ -6,7 +6,6 @@ MIPS processors, more markers than one list of labels holds, more frames than th
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path as FilePath
 from typing import get_args
 
@@ -15,7 +14,7 @@ import numpy as np
 from fba.arrays import Array, Float64, to_float64
 from fba.capture import MarkerMotion
 from fba.choices import FileUpAxis
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError, warn
 from fba.formats.c3d._parameters import BLOCK_BYTES, KEY, Parameters, read_parameters
 from fba.formats.markers._rows import METRES, file_rate, unique_names, without_subject
 from fba.formats.text.frame_rates import Rate
@@ -77,7 +76,7 @@ def read_markers(
     if not there:
         raise FormatError(cut, path=path)
     if there < frames:
-        warnings.warn(f"{path}: {cut}; these are read", FbaWarning, stacklevel=2)
+        warn(f"{path}: {cut}; these are read", stacklevel=2)
     frames = min(frames, there)
     limits.check_frames(frames, f"{path}: a capture")
     limits.check_bytes(frames * points * 3 * 8 * 2, f"{path}: a capture", source=len(data))

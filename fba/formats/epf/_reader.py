@@ -8,7 +8,6 @@ limits apply to the plane of their block. Only I planes carry masks, quantisers,
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +16,7 @@ from fba.arrays import Bool, UInt8
 from fba.codec import FrameRate, PartSettings, PlaneSettings, RangeLists, TimeCode
 from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
 from fba.encoder_options import QUANT_MAX
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.formats.epf._tags import BODY, FACE, PARTS, TAGS, Part
 from fba.formats.text._lines import Lines, content, decoded
 from fba.formats.text._values import FRAME_NUMBER_MAX
@@ -133,10 +132,9 @@ class _Reader:
                     line=block[list_tags[0]].line,
                 )
             for tag in changed:
-                warnings.warn(
+                warn(
                     f"{self.lines.path}:{block[tag].line}: {tag} in the block of a P plane (ISI 0) "
                     "takes effect at the next I plane",
-                    FbaWarning,
                     stacklevel=5,
                 )
             return state.sent

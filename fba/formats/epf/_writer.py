@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from fba.atomic import atomic
 from fba.codec import PartSettings, PlaneSettings
 from fba.codec.settings import RANGE_CODE_MAX, RANGE_UNIT
-from fba.errors import FbaWarning, FormatError, UnsupportedError
+from fba.errors import FormatError, UnsupportedError, warn
 from fba.formats.epf._tags import BODY, PARTS, Part
 from fba.source import Path
 
@@ -29,10 +28,9 @@ def write_epf(path: Path, planes: Iterable[PlaneSettings]) -> None:
         if not writer.planes:
             raise FormatError("there are no planes to write", path=path)
     if writer.start_codes:
-        warnings.warn(
+        warn(
             f"{path}: {writer.start_codes} planes have a start code before them, which an EPF file "
             "cannot store; with the option start_codes, the encoder writes new ones",
-            FbaWarning,
             stacklevel=2,
         )
 

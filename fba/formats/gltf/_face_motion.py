@@ -16,7 +16,7 @@ from fba.animation import FaceTrack
 from fba.arrays import Bool, Float64
 from fba.capture import shape_faps
 from fba.capture.blendshapes.combination import JAW_OPEN, RADIAN, combine, to_face_track
-from fba.errors import FbaWarning
+from fba.errors import FbaWarning, warn
 from fba.formats.gltf._pose import Sampler, nearest_rotation, sample
 from fba.formats.gltf.clips import choose_clip
 from fba.formats.gltf.humanoid import find_humanoid
@@ -120,10 +120,9 @@ def _weights(gltf: Gltf, clip: Clip, times: Float64) -> dict[str, Float64]:
             result.setdefault(name, np.clip(sample(shift, times)[:, 0], 0.0, 1.0))
     strange = sorted(set(unknown))
     if strange:
-        warnings.warn(
+        warn(
             f"{gltf.file}: {len(strange)} animated morph targets are left out, as their names say no FAP: "
             f"{', '.join(strange[:MAX_NAMES])}{', ...' if len(strange) > MAX_NAMES else ''}",
-            FbaWarning,
             stacklevel=6,
         )
     return result

@@ -7,7 +7,6 @@ numbers.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from fba.animation import FaceTrack
 from fba.arrays import Bool, Float32, Float64
-from fba.errors import FbaWarning
+from fba.errors import warn
 from fba.face import FaceModel, resolve
 from fba.formats.gltf._fap_joints import FapJoint
 from fba.formats.gltf._morph_targets import Targets
@@ -97,10 +96,9 @@ def read_face(gltf: Gltf, clip: Clip, note: Value, times: Float64) -> FaceTrack:
             raise entry.error("expected a FAP and an accessor")
         values[:, _fap(pair[0]) - 1] = gltf.accessors.floats(pair[1], "SCALAR", count=len(times))[:, 0]
     if missing:
-        warnings.warn(
+        warn(
             f"{gltf.file}: morph targets of FAPs are missing, and taken as 0: "
             f"{', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}",
-            FbaWarning,
             stacklevel=6,
         )
     values = np.rint(values)

@@ -18,7 +18,7 @@ from fba.arrays import Bool, Float64
 from fba.body import Skeleton
 from fba.capture import Captured, SkeletonMotion, SkeletonOptions, retarget_motion
 from fba.capture.bones import find_bones
-from fba.errors import FbaWarning, ModelError
+from fba.errors import FbaWarning, ModelError, warn
 from fba.formats.gltf._face_motion import find_face_clip, nodes_of_faces, read_face_motion
 from fba.formats.gltf._own_files import find_note, read_note
 from fba.formats.gltf._pose import BindPose, Sampler, key_times
@@ -285,9 +285,8 @@ def _stretched(motion: SkeletonMotion, positions: Float64) -> Bool:
 
 def _warn_of_stretching(name: str, joints: list[str]) -> None:
     """Warn of joints that move relative to their parents, but keep their place of the bind pose."""
-    warnings.warn(
+    warn(
         f"{name}: joints whose offset from the parent varies, or differs from the bind pose, "
         f"keep that of the bind pose: {', '.join(joints[:5])}{', ...' if len(joints) > 5 else ''}",
-        FbaWarning,
         stacklevel=5,
     )

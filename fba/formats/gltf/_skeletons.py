@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -13,7 +12,7 @@ from fba import rotations
 from fba.body import ROOT, Skeleton
 from fba.capture import SkeletonMotion
 from fba.capture.bones import find_bones, match
-from fba.errors import FbaWarning, ModelError
+from fba.errors import ModelError, warn
 from fba.formats.gltf._pose import BindPose, find_bind_pose
 from fba.formats.gltf.humanoid import Humanoid, find_humanoid
 from fba.gltf import Gltf
@@ -126,10 +125,9 @@ def _skeleton(gltf: Gltf) -> list[int]:
     best = max(trees.values(), key=lambda tree: (_fit(gltf, tree), len(tree)))
     others = [gltf.nodes[root].name for root, tree in trees.items() if tree is not best]
     if others:
-        warnings.warn(
+        warn(
             f"{gltf.file}: has several skeletons; {gltf.nodes[best[0]].name!r} is read, "
             f"the others are left out: {', '.join(others[:5])}{', ...' if len(others) > 5 else ''}",
-            FbaWarning,
             stacklevel=5,
         )
     return best

@@ -8,7 +8,6 @@ describes what is approximate.
 from __future__ import annotations
 
 import os
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64, Int32
 from fba.choices import Axes
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError, warn
 from fba.formats.gltf._joints import Clip, move, nest, start_clip
 from fba.gltf import Builder
 from fba.source import Path
@@ -75,7 +74,10 @@ def write(
     clip = start_clip(builder, times, path)
     note: dict[str, Any] = {"version": 1, "rate": str(animation.rate), "first": first}
     if animation.body is not None:
-        roots = _add_person(builder, clip, animation, note, mesh, model, body, axes)
+        from fba.body import BodyModel
+
+        person = (body or BodyModel.default()) if mesh else body
+        roots = _add_person(builder, clip, animation, note, model, person, axes)
     else:
         roots = _add_head(builder, clip, animation, note, model)
     builder.add("scenes", {"nodes": roots})
@@ -88,16 +90,17 @@ def _add_person(
     clip: Clip,
     animation: Animation,
     note: dict[str, Any],
-    mesh: bool,
     model: FaceModel | None,
-    body: BodyModel | None,
+    person: BodyModel | None,
     axes: Axes,
 ) -> list[int]:
-    """Add a person or a skeleton with its animation, and complete the note; return the root nodes."""
-    from fba.body import BapSolver, BodyModel, Skeleton
+    """Add a person or a skeleton with its animation, and complete the note; return the root nodes.
+
+    person: None for a skeleton alone.
+    """
+    from fba.body import BapSolver, Skeleton
     from fba.gltf import PartWriter
 
-    person = (body or BodyModel.default()) if mesh else body
     skeleton = Skeleton.default() if person is None else person.skeleton
     solver = BapSolver(skeleton, axes)
     nodes = nest(builder, skeleton.names, skeleton.parents)
@@ -181,11 +184,7 @@ def _make_head(
 
     if person.eyes is None:
         if animation.face is not None or model is not None:
-            warnings.warn(
-                f"the body {person.name!r} has no position for a face; none is shown",
-                FbaWarning,
-                stacklevel=5,
-            )
+            warn(f"the body {person.name!r} has no position for a face; none is shown", stacklevel=5)
         return None
     face = model or FaceModel.default()
     return start_head(builder, clip, face, _shown(animation, face), person)

@@ -9,7 +9,6 @@ those of a bone of the spine, for example, follow the vertebra in its middle (`f
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -25,7 +24,7 @@ from fba.body.own_head import OwnHead
 from fba.body.skin.skin_weights import strongest_weights
 from fba.capture import SkeletonMotion, SkeletonOptions, shape_faps
 from fba.capture.preparation import Rest, find_rest
-from fba.errors import FbaWarning, FormatError, ModelError
+from fba.errors import FormatError, ModelError, warn
 from fba.formats.gltf._own_heads import PlacedMesh, read_head
 from fba.formats.gltf._pose import bind_matrices
 from fba.formats.gltf._reader import make_person
@@ -354,10 +353,9 @@ def _read_parts(gltf: Gltf, found: Joints, carriers: dict[int, int], fit: _Fit) 
             )  # fmt: skip
             parts.append(PlacedMesh(part, number, primitive, linear, bound))
     if left_out:
-        warnings.warn(
+        warn(
             f"{gltf.file}: meshes that hang on no joint of the person are left out: "
             f"{', '.join(left_out[:5])}{', ...' if len(left_out) > 5 else ''}",
-            FbaWarning,
             stacklevel=5,
         )
     return parts

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import re
-import warnings
 from contextlib import suppress
 from pathlib import Path as FilePath
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
-from fba.errors import FbaWarning, FormatError
+from fba.errors import FormatError, warn
 from fba.formats.markers._rows import (
     METRES,
     build_motion,
@@ -73,8 +72,6 @@ def read_markers(
     rows, numbers = parse_rows(
         _without_codes(lines, row + 1, columns), row + 1, ",", len(columns), path, limits
     )
-    if not len(rows):
-        raise FormatError("holds no frames", path=path)
     second = next((n for n, cell in enumerate(columns) if cell.lower().startswith("time (")), None)
     times = rows[:, second] if second is not None else np.full(len(rows), np.nan)
     stored: str | float = settings.get("export frame rate", "") or settings.get("capture frame rate", "")
@@ -137,10 +134,10 @@ def _find_markers(rows: list[list[str]], columns: list[str], path: Path) -> list
             continue
         labelled = [one for one in markers if not re.match(r"(.*:)?unlabell?ed\b", one[0], re.IGNORECASE)]
         if labelled and len(labelled) < len(markers):
-            warnings.warn(
+            warn(
                 f"{path}: {len(markers) - len(labelled)} columns of markers without a label are left out",
-                FbaWarning, stacklevel=3,
-            )  # fmt: skip
+                stacklevel=3,
+            )
         return labelled or markers
     raise FormatError(
         "holds no markers, only rigid bodies or bones; export markers from Motive as well", path=path

@@ -56,9 +56,9 @@ def read_markers(
     end = start + 5
     while end < len(lines) and lines[end].strip(" \t,;"):
         end += 1
-    rows, numbers = parse_rows(lines, start + 5, delimiter, len(axes), path, limits, last=end)
-    if not len(rows):
+    if end == start + 5:
         raise FormatError("the section Trajectories holds no frames", path=path, line=start + 6)
+    rows, numbers = parse_rows(lines, start + 5, delimiter, len(axes), path, limits, last=end)
     rate = file_rate(lines[start + 1].strip(' \t,;"'), source_rate, path)
     frames = rows[:, 0]
     if not np.isfinite(frames).all():

@@ -70,8 +70,6 @@ def read_markers(
         leading = len(lines[first].rstrip("\r\n\t").split("\t")) - 3 * len(labels)
         leading = leading if leading in (1, 2) else 0
     rows, numbers = parse_rows(lines, first, "\t", leading + 3 * len(labels), path, limits)
-    if not len(rows):
-        raise FormatError("holds no frames", path=path)
     warn_if_cut(path, _first_number(settings, "NO_OF_FRAMES"), len(rows))
     rate = file_rate((settings.get("FREQUENCY") or [""])[0], source_rate, path)
     positions = rows[:, leading:].reshape(len(rows), -1, 3)

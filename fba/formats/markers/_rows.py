@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -11,7 +10,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture import MarkerMotion
 from fba.choices import FileUpAxis
-from fba.errors import FbaWarning, FormatError, Remedy
+from fba.errors import FormatError, Remedy, warn
 from fba.formats.text.frame_rates import Rate, parse_rate
 from fba.limits import Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
@@ -57,11 +56,14 @@ def parse_rows(
     """Return rows of numbers, float64 (T, columns), NaN for gaps, and the line of each row (1-based).
 
     first, last: the first line to read, and the line at which to stop. Empty lines are skipped. Missing cells
-    at the end of a row are gaps. Raises FormatError for a cell that is no number, and for too many cells.
+    at the end of a row are gaps. Raises FormatError for a cell that is no number, for too many cells, and
+    without rows.
     """
     if columns > MOST_COLUMNS:
         raise FormatError(f"has {columns} columns, more than the {MOST_COLUMNS} that are read", path=path)
     numbers = [n for n in range(first, len(lines) if last is None else last) if lines[n].strip(" \t,;")]
+    if not numbers:
+        raise FormatError("holds no frames", path=path)
     limits.check_frames(len(numbers), f"{path}: a capture")
     source = sum(len(lines[n]) + 1 for n in numbers)
     limits.check_bytes(2 * 8 * columns * len(numbers), f"{path}: a capture", source=source)
@@ -140,11 +142,7 @@ def build_motion(
 def warn_if_cut(path: Path, stated: float, count: int) -> None:
     """Warn (FbaWarning) if a file does not hold as many frames as it states; NaN where it states nothing."""
     if np.isfinite(stated) and stated != count:
-        warnings.warn(
-            f"{path}: says that it has {stated:g} frames, but holds {count}; these are read",
-            FbaWarning,
-            stacklevel=3,
-        )
+        warn(f"{path}: says that it has {stated:g} frames, but holds {count}; these are read", stacklevel=3)
 
 
 def file_rate(stored: float | str, source_rate: Rate | None, path: Path) -> Fraction:

@@ -78,8 +78,6 @@ def read_markers(
         unit = triples[0][2]
         place = next((n for n, cell in enumerate(cells) if cell.lower() in TIMES), None)
         times = rows[:, place] if place is not None else np.full(len(rows), np.nan)
-    if not len(positions):
-        raise FormatError("holds no frames", path=path)
     if np.isfinite(times).all():
         back = np.flatnonzero(np.diff(times) <= 0)
         rate = file_rate(
@@ -154,8 +152,6 @@ def _read_long(
             f"names {len(names)} markers, more than the {MarkerMotion.MAX_MARKERS} that are read", path=path
         )
     rows, numbers = parse_rows(body, 1, delimiter, len(cells), path, limits)
-    if not len(rows):
-        raise FormatError("holds no frames", path=path)
     if len(owner) != len(rows):
         raise FormatError("a row names no marker", path=path)
     keys = rows[:, key]

@@ -59,8 +59,6 @@ def read_markers(
         first += 1
     labels = _labels(lines[row].split(delimiter)[2:], lines[row + 1 : first], delimiter, path, row + 1)
     rows, numbers = parse_rows(lines, first, delimiter, 2 + 3 * len(labels), path, limits)
-    if not len(rows):
-        raise FormatError("holds no frames", path=path)
     warn_if_cut(path, _number(header.get("numframes", "")), len(rows))
     times = rows[:, 1]
     stored = header.get("datarate", "") or (

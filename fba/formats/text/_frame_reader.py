@@ -6,14 +6,13 @@ error names the line and the token.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
 from fba.arrays import Bool, Int32, Int64
-from fba.errors import FbaWarning, FormatError, Remedy
+from fba.errors import FormatError, Remedy, warn
 from fba.formats.text._layout import Layout
 from fba.formats.text._lines import GIVE_RATE, Header, Lines, content, is_header, is_mask, parse_header
 from fba.formats.text._values import FRAME_NUMBER_MAX, Row, ValueParser
@@ -73,11 +72,7 @@ def read_frames(
             reader.flush(salvage=True)
             if not salvage or not reader.count:
                 raise
-            warnings.warn(
-                f"{error.finding}; salvaged the {reader.count} frames before the damage",
-                FbaWarning,
-                stacklevel=3,
-            )
+            warn(f"{error.finding}; salvaged the {reader.count} frames before the damage", stacklevel=3)
     limits.check_frames(reader.count, f"{path}: the file")
     return reader.frames(header)
 
@@ -105,10 +100,9 @@ def _read_header(
                 raise
             header = parse_header(body, lines, rate)
         if header.version not in layout.versions:
-            warnings.warn(
+            warn(
                 f"{lines.path}:{lines.number}: {layout.kind} version {header.version} is unknown "
                 f"(known: {', '.join(layout.versions)}); read like version {layout.version}",
-                FbaWarning,
                 stacklevel=4,
             )
         return header if name is None else Header(header.version, name, header.rate, header.frames), None
@@ -186,16 +180,14 @@ class _Reader:
         )
         self._blocks.clear()
         if self.values.rounded:
-            warnings.warn(
+            warn(
                 f"{path}: {self.values.rounded} values are not integers, the first on line "
                 f"{self.values.rounded_line}; rounded half away from zero",
-                FbaWarning,
                 stacklevel=4,
             )
         if header.frames is not None and header.frames != len(index):
-            warnings.warn(
+            warn(
                 f"{path}: the header says {header.frames} frames, the file has {len(index)}; all are read",
-                FbaWarning,
                 stacklevel=4,
             )
         index = _renumber(index, numbers, path)
@@ -281,10 +273,9 @@ def _renumber(index: Int64, lines: Int64, path: Path) -> Int64:
     if not repeated.any():
         return index
     first = int(np.argmax(repeated)) + 1
-    warnings.warn(
+    warn(
         f"{path}:{int(lines[first])}: frame number {int(index[first])} comes after {int(index[first - 1])}; "
         f"{int(repeated.sum())} frames whose number does not increase are read as the next ones in time",
-        FbaWarning,
         stacklevel=5,
     )
     renumbered: Int64 = np.concatenate([index[:1], index[0] + np.cumsum(np.where(repeated, 1, steps))])

@@ -8,11 +8,4 @@ from fba.persona.points._registration import Registered, fit_face_points, regist
 from fba.persona.points._tracked import TrackedFace
 from fba.persona.points.layout import mask_distance
 
-__all__ = [
-    "Registered",
-    "TrackedFace",
-    "fit_face_points",
-    "from_point_motion",
-    "mask_distance",
-    "register",
-]
+__all__ = ["Registered", "TrackedFace", "fit_face_points", "from_point_motion", "mask_distance", "register"]

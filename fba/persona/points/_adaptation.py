@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from fba.arrays import Bool, Float64
@@ -11,7 +9,7 @@ from fba.capture import PointMotion
 from fba.capture.points.picture import face_misfit, upright_points
 from fba.capture.points.places import point_places, take_points
 from fba.capture.points.poses import fit_poses
-from fba.errors import FbaWarning, ModelError
+from fba.errors import ModelError, warn
 from fba.face import neutral_points
 from fba.parameters import point_rows
 from fba.persona.points._tracked import TrackedFace
@@ -65,11 +63,7 @@ def from_point_motion(motion: PointMotion, *, aspect: float | None = None) -> Tr
     rigid = [column_of[place] for place in RIGID if place in column_of]
     angles[whole] = head_angles(template[rigid], upright[:, rigid])
     if not whole.all():
-        warnings.warn(
-            f"{len(motion) - len(upright)} of {len(motion)} frames have no whole face",
-            FbaWarning,
-            stacklevel=2,
-        )
+        warn(f"{len(motion) - len(upright)} of {len(motion)} frames have no whole face", stacklevel=2)
     return TrackedFace(points, angles, whole, motion.times, motion.rate, motion.name)
 
 

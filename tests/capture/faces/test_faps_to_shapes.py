@@ -1,7 +1,5 @@
 """FAPs to blendshapes and back: weights that come out as they went in, visemes, tables that are written."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 
@@ -48,8 +46,6 @@ def test_each_shape_alone_comes_back(shape: str) -> None:
     assert np.corrcoef(back.weights[:, column], RAMP)[0, 1] > 0.98
     assert ((back.weights >= 0) & (back.weights <= 1)).all()
     again, first = from_blendshapes(back).face, from_blendshapes(motion).face
-    assert again is not None
-    assert first is not None
     difference = np.abs(again.values - first.values)[:, np.abs(first.values).max(axis=0) < 10_000]
     assert difference.max() <= 130  # 1.5 mm
 
@@ -78,7 +74,6 @@ def test_lips_of_an_open_jaw_stay_where_they_are() -> None:
     assert (closed <= opened + 1e-9).all()
     assert (opened > [0.05, 0.2, 0.35]).all()
     again = from_blendshapes(back).face
-    assert again is not None
     lips = [fap_numbers()[name] - 1 for name in ("raise_b_midlip", "raise_b_lip_lm", "lower_t_midlip")]
     assert np.abs(again.values[:, lips]).max() < 130
 

@@ -1,7 +1,5 @@
 """Eyes that turn further than eyes do, from every kind of source."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -76,7 +74,6 @@ def vmc(_: Path) -> fba.Animation:
 def test_eyes_stop_where_eyes_do(make: Callable[[Path], fba.Animation], tmp_path: Path) -> None:
     with pytest.warns(FbaWarning, match="eyes that turn further than 34 degrees"):
         face = make(tmp_path).face
-    assert face is not None
     turns = np.stack([np.hypot(*face.values[:, eye].T) for eye in EYES])
     assert turns.max() == pytest.approx(LIMIT, abs=2)
     assert (np.diff(turns[:, 3:], axis=1) > -600).all()  # they go there, and stay

@@ -1,7 +1,5 @@
 """Faces that arrive live: the stream is that of the same capture in a file, and what is wrong is counted."""
 
-from __future__ import annotations
-
 import io
 import socket
 from fractions import Fraction
@@ -56,9 +54,6 @@ def divided(data: bytes) -> list[bytes]:
 
 def check_same(live: fba.Animation | None, expected: fba.Animation, off: int = 0) -> None:
     """Two animations but for their names. off: by how much values may differ."""
-    assert live is not None
-    assert live.face is not None
-    assert expected.face is not None
     assert live.rate == expected.rate
     np.testing.assert_array_equal(live.index, expected.index)
     np.testing.assert_array_equal(live.face.mask, expected.face.mask)
@@ -125,7 +120,6 @@ def test_out_of_order_doubled_lost_and_without_a_face(tmp_path: Path) -> None:
     check_same(live, from_file(tmp_path, b"".join(SENT)))
     live, summary = captured("livelink", at_rate([*SENT[:4], *SENT[5:8], SENT[4], *SENT[8:]]))
     assert summary.late == 1
-    assert live is not None
     assert len(live) == ROWS
 
 
@@ -157,10 +151,7 @@ def test_of_two_senders_the_first_or_the_one_that_is_named() -> None:
     first, summary = captured("livelink", mixed, say=said.append)
     assert first == captured("livelink", at_rate(SENT))[0]
     assert dict(summary.other_senders) == {"'Bo' (10.0.0.2)": ROWS}
-    assert said == [
-        "receiving from 'iPhone' (10.0.0.2)",
-        "'Bo' (10.0.0.2) also sends, and is left out",
-    ]
+    assert said == ["receiving from 'iPhone' (10.0.0.2)", "'Bo' (10.0.0.2) also sends, and is left out"]
     named, _ = captured("livelink", mixed, sender="Bo")
     assert named == captured("livelink", at_rate(other))[0]
     assert captured("livelink", mixed, sender="Cy")[0] is None
@@ -185,18 +176,15 @@ def test_clocks_that_jump() -> None:
     assert summary.strayed == 1
     again = livelink_udp({**WEIGHTS, **ANGLES}, start=500.0)  # the telephone was set to another time
     live, summary = captured("livelink", at_rate([*SENT, *again]))
-    assert live is not None
     assert summary.jumps == 1
     assert len(live) == pytest.approx(2 * ROWS, abs=2)
     ahead = livelink_udp({**WEIGHTS, **ANGLES}, start=18_060.0)  # without a pause
     live, summary = captured("livelink", at_rate([*SENT, *ahead]))
-    assert live is not None
     assert (summary.jumps, summary.gaps) == (1, 0)
     assert len(live) == pytest.approx(2 * ROWS, abs=2)
     paused = [*at_rate(SENT), *((now + 100, host, one) for now, host, one in at_rate(
         livelink_udp({**WEIGHTS, **ANGLES}, start=18_100.0)))]  # fmt: skip
     live, summary = captured("livelink", paused)
-    assert live is not None
     assert (summary.jumps, summary.gaps) == (0, 1)
     assert len(live) == pytest.approx(60 * 101, abs=3)  # the face holds still meanwhile
 
@@ -204,7 +192,6 @@ def test_clocks_that_jump() -> None:
 def test_a_rate_that_no_stream_can_have() -> None:
     whole = SENT[0].replace(b"\0\0\0\x3c\0\0\0\1", b"\0\0\0\x14\0\x2a\xaa\xab")
     animation, _ = captured("livelink", at_rate([whole]))
-    assert animation is not None
     assert animation.rate == 1
     assert stream_rate(Fraction(60_000, 1001)) == Fraction(60_000, 1001)
     assert stream_rate(Fraction(1000, 33)) == Fraction(485, 16)
@@ -214,7 +201,6 @@ def test_a_rate_that_no_stream_can_have() -> None:
 def test_over_midnight() -> None:
     sent = [datagram([0.1] * 61, (86_399.9 + row / 60) % 86_400) for row in range(30)]
     live, summary = captured("livelink", at_rate(sent))
-    assert live is not None
     assert (len(live), summary.jumps, summary.strayed) == (30, 0, 0)
 
 
@@ -223,10 +209,6 @@ def test_the_neutral_face_of_the_first_seconds_is_subtracted() -> None:
     sent = [datagram(row, 18_000 + number / 60) for number, row in enumerate(rows)]
     live, summary = captured("livelink", at_rate(sent), neutral=0.4)
     plain, _ = captured("livelink", at_rate([datagram([0.3] * 61, 18_000 + n / 60) for n in range(60)]))
-    assert live is not None
-    assert plain is not None
-    assert live.face is not None
-    assert plain.face is not None
     assert not live.face.values[:29].any()
     np.testing.assert_allclose(live.face.values[40], plain.face.values[40], atol=1)
     assert not live.face.values[52:].any()  # no weight is less than none
@@ -281,10 +263,7 @@ def test_objects_of_vtube_studio() -> None:
         Fraction(60),
         head=np.radians(head[seen]),
     )
-    assert live is not None
-    assert live.face is not None
     expected = from_blendshapes(motion).face
-    assert expected is not None
     np.testing.assert_allclose(live.face.values, expected.values[: len(live)], atol=1)
     assert (summary.used, summary.unseen) == (ROWS - 1, 1)
     assert dict(summary.refused) == {"not objects of VTube Studio": 6, "without a time": 1}
@@ -301,7 +280,6 @@ def test_the_newest_datagram_is_shown() -> None:
             assert face is None
             continue
         alone, _ = captured("livelink", [(0.0, "10.0.0.2", data)])
-        assert alone is not None
         assert face == alone.face
     nobody = Capture(find_kind("vtube"), lambda _frames: None, neutral=1.0)
     nobody.receive(vtube_objects(WEIGHTS, np.zeros((1, 3)))[0], "10.0.0.2", 0.0)
@@ -317,8 +295,6 @@ def test_swapped_sides() -> None:
 
     one, summary = captured("livelink", at_rate(face(0.6, 0.1)), swap=True)
     other, _ = captured("livelink", at_rate(face(0.1, 0.6)))
-    assert one is not None
-    assert other is not None
     assert one.face == other.face
     assert summary.notes == ["mouthLeft/mouthRight and jawLeft/jawRight changed places"]
     assert one != captured("livelink", at_rate(face(0.6, 0.1)))[0]

@@ -1,7 +1,5 @@
 """Files that are written live: complete at any moment, also where the program is killed."""
 
-from __future__ import annotations
-
 import io
 import os
 import random

@@ -1,7 +1,5 @@
 """The VMC protocol: bodies from Unity's bones, faces from expressions, and OSC that is damaged."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -11,10 +9,9 @@ import fba
 from fba.arrays import Float64
 from fba.body import BapSolver
 from fba.capture import SkeletonMotion, from_skeleton
-from fba.live._protocols._osc import read_messages
 from fba.live._protocols.sample import DatagramError
 from fba.live._protocols.unity_bones import joint_of, parents
-from fba.live._protocols.vmc import VmcReader
+from fba.live._protocols.vmc import VmcReader, read_messages
 from fba.parameters import fap_numbers
 from live_senders import UNITY_BONES, Sent, bundle, captured, osc, vmc_frames
 
@@ -75,8 +72,6 @@ def person() -> fba.Animation:
 
 def test_a_body_is_that_of_the_same_skeleton_in_a_file(person: fba.Animation) -> None:
     whole = from_skeleton(skeleton_motion(), ground="none", plant=False, rest="file", up="+y")
-    assert person.body is not None
-    assert whole.body is not None
     np.testing.assert_array_equal(person.index, np.arange(COUNT - 1))
     np.testing.assert_array_equal(person.body.mask, whole.body.mask[:-1])
     np.testing.assert_allclose(person.body.values, whole.body.values[:-1], atol=300)  # 1e-5 rad
@@ -84,16 +79,12 @@ def test_a_body_is_that_of_the_same_skeleton_in_a_file(person: fba.Animation) ->
 
 def test_a_few_frames_at_a_time_make_the_same_body(person: fba.Animation) -> None:
     animation, _ = captured("vmc", vmc_frames(TURNS, EXPRESSIONS, COUNT, path=PATH, split=100))
-    assert animation is not None
-    assert animation.body is not None
-    assert person.body is not None
     assert animation.face == person.face
     np.testing.assert_allclose(animation.body.values, person.body.values, atol=300)
 
 
 def test_left_is_left_and_down_is_down(person: fba.Animation) -> None:
     solver = BapSolver()
-    assert person.body is not None
     places = solver.pose(person.body.values[:1])[0][:, :3, 3]
     at = {name: places[solver.skeleton.number(name)] for name in
           ("l_shoulder", "l_elbow", "l_wrist", "r_shoulder", "r_elbow")}  # fmt: skip
@@ -105,7 +96,6 @@ def test_left_is_left_and_down_is_down(person: fba.Animation) -> None:
 
 
 def test_expressions_are_faps(person: fba.Animation) -> None:
-    assert person.face is not None
     values = {name: person.face.values[:, number - 1] for name, number in fap_numbers().items()}
     jaw = values["open_jaw"]
     assert jaw.min() > 0
@@ -125,11 +115,9 @@ def test_old_names_of_expressions_are_the_new_ones() -> None:
     for names in (list(NEW_NAMES), list(NEW_NAMES.values())):
         rows = {name: np.array([0.0, 0.1, 0.0]) + 0.05 * number for number, name in enumerate(names)}
         animation, summary = captured("vmc", vmc_frames({}, rows, 3), settle=False)
-        assert animation is not None
         assert not any("left out" in note for note in summary.notes)
         faces.append(animation.face)
     assert faces[0] == faces[1]
-    assert faces[0] is not None
     assert faces[0].values.any()
 
 
@@ -138,8 +126,6 @@ def test_shapes_with_arkits_names_come_before_expressions() -> None:
     rows = {name: np.full(COUNT, 0.5) for name in names}
     both, summary = captured("vmc", vmc_frames({}, rows | {"A": np.ones(COUNT)}, COUNT), settle=False)
     alone, _ = captured("vmc", vmc_frames({}, rows, COUNT), settle=False)
-    assert both is not None
-    assert alone is not None
     assert both.face == alone.face
     assert summary.notes[-1] == "5 shapes have ARKit's names; 1 other expressions are left out"
 
@@ -153,9 +139,7 @@ def test_a_face_alone_turns_its_head_by_the_bones_of_the_neck() -> None:
     ]  # fmt: skip
     sent: list[Sent] = [(row / 30, "10.0.0.5", bundle(*one)) for row, one in enumerate(messages)]
     animation, summary = captured("vmc", sent)
-    assert animation is not None
     assert animation.body is None
-    assert animation.face is not None
     assert summary.notes[-1] == "there is no body: no bone is called Hips"
     pitch, yaw = (animation.face.values[3, fap_numbers()[name] - 1] for name in ("head_pitch", "head_yaw"))
     assert pitch == pytest.approx(20_000, abs=700)  # down
@@ -166,7 +150,6 @@ def test_bones_of_no_body() -> None:
     hips = [osc("/VMC/Ext/Bone/Pos", name, *(0.0,) * 6, 1.0) for name in ("Hips", "Head")]
     animation, summary = captured("vmc", [(0.0, "10.0.0.5", bundle(osc("/VMC/Ext/T", 1.0), *hips)),
                                           (0.1, "10.0.0.5", osc("/VMC/Ext/T", 2.0))])  # fmt: skip
-    assert animation is not None
     assert animation.body is None
     assert summary.notes[-1].startswith("there is no body: ")
 
@@ -186,8 +169,6 @@ def test_a_t_pose_at_the_beginning_counts_as_rest() -> None:
     solver = BapSolver()
     elbow, shoulder = (solver.skeleton.number(name) for name in ("l_elbow", "l_shoulder"))
     animation, _ = captured("vmc", odd, settle=False, neutral=0.5)
-    assert animation is not None
-    assert animation.body is not None
     places = solver.pose(animation.body.values)[:, :, :3, 3]
     way = places[:, elbow] - places[:, shoulder]
     slope = np.degrees(np.arctan2(-way[:, 1], way[:, 0]))
@@ -199,7 +180,6 @@ def test_a_t_pose_at_the_beginning_counts_as_rest() -> None:
 def test_other_senders(options: dict[str, bool], person: fba.Animation) -> None:
     sent = vmc_frames(TURNS, EXPRESSIONS, COUNT, path=PATH, **options)  # type: ignore[arg-type]
     animation, summary = captured("vmc", sent, settle=False)
-    assert animation is not None
     assert animation.body is not None
     assert person.body is not None
     assert len(animation) == pytest.approx(COUNT, abs=2)

@@ -1,7 +1,5 @@
 """The default person, animated by a known motion and written as many makers do, comes back as it was."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -196,7 +194,6 @@ def test_a_person_is_restored(maker: Maker) -> None:
     wanted, names = truth()
     text, joints = write(maker)
     animation = from_skeleton(parse(text))
-    assert animation.body is not None
     found = BapSolver().pose(animation.body.values)
     number = {name: n for n, name in enumerate(names)}
     known = set(joints.values())

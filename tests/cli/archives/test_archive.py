@@ -1,9 +1,6 @@
 """`fba archive`: reports for people and programs, exit codes, wrong usage."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,8 +10,7 @@ pytest.importorskip("duckdb")
 
 import archived
 import fba
-
-Run = Callable[..., tuple[int, str, str]]
+from command_line import Run
 
 
 @pytest.fixture
@@ -27,24 +23,27 @@ def takes(tmp_path: Path) -> Path:
 
 def test_from_files_to_answers(run: Run, takes: Path, tmp_path: Path) -> None:
     out = tmp_path / "archive"
-    code, printed, _ = run("archive", "make", takes, "-o", out, "--jobs", 1)
-    assert code == 1
+    printed = run("archive", "make", takes, "-o", out, "--jobs", 1, code=1).out
     assert "1 performances added, 0 there before, 1 failed" in printed
     assert "bad.fap" in printed
     (takes / "bad.fap").unlink()
-    code, printed, _ = run("archive", "make", takes, "-o", out, "--jobs", 1, "--json")
-    assert (code, json.loads(printed)) == (0, {"added": 0, "unchanged": 1, "rounded": 0, "failed": []})
-    about = json.loads(run("archive", "info", out, "--json")[1])
+    assert json.loads(run("archive", "make", takes, "-o", out, "--jobs", 1, "--json").out) == {
+        "added": 0,
+        "unchanged": 1,
+        "rounded": 0,
+        "failed": [],
+    }
+    about = json.loads(run("archive", "info", out, "--json").out)
     assert (about["performances"], about["subjects"], about["seconds"], about["rates"]) == (1, 1, 2.0, [25.0])
-    assert "1 performances intact, 0 faults" in run("archive", "verify", out, "--jobs", 1)[1]
-    assert run("archive", "index", out, "--jobs", 1)[0] == 0
-    code, printed, err = run("archive", "query", out, "seconds > 1", "--json", "--columns", "all")
+    assert "1 performances intact, 0 faults" in run("archive", "verify", out, "--jobs", 1).out
+    run("archive", "index", out, "--jobs", 1)
+    _, printed, err = run("archive", "query", out, "seconds > 1", "--json", "--columns", "all")
     (row,) = json.loads(printed)
-    assert (code, err) == (0, "1 performances\n")
+    assert err == "1 performances\n"
     assert row["name"] == "anna/one"
     assert len(row["motion"]) > 3
-    assert run("archive", "query", out, "seconds > 9")[:2] == (0, "")
-    assert run("archive", "extract", out, "anna/one", "-o", tmp_path / "back")[0] == 0
+    assert run("archive", "query", out, "seconds > 9").out == ""
+    run("archive", "extract", out, "anna/one", "-o", tmp_path / "back")
     assert fba.read(tmp_path / "back" / "anna" / "one.fba") == fba.read(takes / "anna" / "one.fap")
 
 
@@ -55,11 +54,8 @@ def test_damage_ends_with_1(run: Run, takes: Path, tmp_path: Path) -> None:
     data = bytearray(shard.read_bytes())
     data[len(data) // 4] ^= 1
     shard.write_bytes(data)
-    code, printed, _ = run("archive", "verify", out, "--jobs", 1)
-    assert code == 1
-    assert "0 performances intact, 1 faults" in printed
-    code, _, err = run("archive", "extract", out, "-o", tmp_path / "back")
-    assert code == 1
+    assert "0 performances intact, 1 faults" in run("archive", "verify", out, "--jobs", 1, code=1).out
+    err = run("archive", "extract", out, "-o", tmp_path / "back", code=1).err
     assert err.startswith(f"fba: error: {shard}: is damaged")
 
 
@@ -81,24 +77,25 @@ def test_wrong_usage_of_archives(
 ) -> None:
     monkeypatch.chdir(takes.parent)
     Path("empty").mkdir()
-    result = run("archive", *arguments)
-    assert result[0] == code
-    assert message in " ".join(result[2].split())
+    assert message in " ".join(run("archive", *arguments, code=code)[2].split())
     assert not Path("out").exists()
 
 
 def test_an_archive_by_its_address(run: Run, takes: Path, tmp_path: Path) -> None:
     pytest.importorskip("fsspec")
     out = f"file://{tmp_path}/far/archive"
-    code, printed, _ = run("archive", "make", takes / "anna", "-o", out, "--jobs", 1)
-    assert (code, printed) == (0, f"{out}: 1 performances added, 0 there before, 0 failed\n")
+    assert (
+        run("archive", "make", takes / "anna", "-o", out, "--jobs", 1).out
+        == f"{out}: 1 performances added, 0 there before, 0 failed\n"
+    )
     assert [path.suffix for path in (tmp_path / "far" / "archive").iterdir()] == [".parquet"]
-    assert json.loads(run("archive", "info", out, "--json")[1])["performances"] == 1
-    assert f"{out}: 1 performances intact" in run("archive", "verify", out, "--jobs", 2)[1]
-    assert f"{out}: 1 performances described" in run("archive", "index", out, "--jobs", 1)[1]
-    assert run("archive", "query", out, "seconds > 1", "--json")[0] == 0
-    assert run("archive", "extract", out, "-o", tmp_path / "back")[0] == 0
+    assert json.loads(run("archive", "info", out, "--json").out)["performances"] == 1
+    assert f"{out}: 1 performances intact" in run("archive", "verify", out, "--jobs", 2).out
+    assert f"{out}: 1 performances described" in run("archive", "index", out, "--jobs", 1).out
+    run("archive", "query", out, "seconds > 1", "--json")
+    run("archive", "extract", out, "-o", tmp_path / "back")
     assert fba.read(tmp_path / "back" / "one.fba") == fba.read(takes / "anna" / "one.fap")
-    code, _, err = run("archive", "info", f"file://{tmp_path}/none")
-    assert (code, err) == (1, f"fba: error: file://{tmp_path}/none: holds no shards (shard-*.parquet); "
-                              "`fba archive make` writes them\n")  # fmt: skip
+    assert run("archive", "info", f"file://{tmp_path}/none", code=1).err == (
+f"fba: error: file://{tmp_path}/none: holds no shards (shard-*.parquet); "
+                              "`fba archive make` writes them\n"
+)  # fmt: skip

@@ -1,7 +1,5 @@
 """`fba convert --batch`: the same results as one by one, failures, interruptions, and going on."""
 
-from __future__ import annotations
-
 import csv
 import os
 import shutil
@@ -9,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,10 +16,10 @@ import pytest
 
 import archived
 import fba
+from command_line import Run
 from fba.archive import RECORD
 from ready_programs import BIN
 
-Run = Callable[..., tuple[int, str, str]]
 SAMPLES = Path(fba.__file__).parent / "samples"
 
 
@@ -50,13 +48,12 @@ def files(folder: Path) -> list[str]:
 
 def test_the_same_as_one_by_one(run: Run, captures: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    code, printed, _ = run("convert", "--batch", captures, out, "--to", "fba", "--jobs", 1)
-    assert code == 1  # two failed
+    printed = run("convert", "--batch", captures, out, "--to", "fba", "--jobs", 1, code=1).out  # two failed
     assert "2 converted, 0 there before, 2 failed; conversions.csv lists all" in printed
     assert "bad.fap" in printed
     assert files(out) == ["anna/hello.fba", RECORD, "turn.fba"]
     for name in ("anna/hello.fap", "turn.bap"):
-        assert run("convert", captures / name, tmp_path / "one.fba")[0] == 0
+        run("convert", captures / name, tmp_path / "one.fba")
         assert (out / name).with_suffix(".fba").read_bytes() == (tmp_path / "one.fba").read_bytes()
     rows = record(out)
     assert rows["anna/hello.fap"][0] == "anna/hello.fba"
@@ -68,23 +65,23 @@ def test_the_same_as_one_by_one(run: Run, captures: Path, tmp_path: Path) -> Non
 def test_what_is_done_is_not_done_again(run: Run, captures: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     arguments = ("convert", "--batch", captures, out, "--to", "fba", "--jobs", 1)
-    run(*arguments)
+    run(*arguments, code=1)
     times = {name: (out / name).stat().st_mtime_ns for name in files(out)}
-    assert "0 converted, 2 there before" in run(*arguments)[1]
+    assert "0 converted, 2 there before" in run(*arguments, code=1).out
     assert (out / "turn.fba").stat().st_mtime_ns == times["turn.fba"]
     (out / "turn.fba").unlink()  # a result that is gone, a source that has changed, other settings
-    assert "1 converted, 1 there before" in run(*arguments)[1]
+    assert "1 converted, 1 there before" in run(*arguments, code=1).out
     fba.write(captures / "anna" / "hello.fap", archived.performance(1, frames=20))
-    assert "1 converted, 1 there before" in run(*arguments)[1]
-    assert "2 converted, 0 there before" in run(*arguments, "--fps", 10)[1]
+    assert "1 converted, 1 there before" in run(*arguments, code=1).out
+    assert "2 converted, 0 there before" in run(*arguments, "--fps", 10, code=1).out
     shutil.copy(SAMPLES / "hello.fap", captures / "bad.fap")
-    assert "1 converted, 2 there before, 1 failed" in run(*arguments, "--fps", 10)[1]
+    assert "1 converted, 2 there before, 1 failed" in run(*arguments, "--fps", 10, code=1).out
     assert record(out)["bad.fap"][3] == ""
 
 
 def test_processes_do_the_same(run: Run, captures: Path, tmp_path: Path) -> None:
     for jobs in (1, 2):
-        run("convert", "--batch", captures, tmp_path / str(jobs), "--to", "bap", "--jobs", jobs)
+        run("convert", "--batch", captures, tmp_path / str(jobs), "--to", "bap", "--jobs", jobs, code=1)
     assert files(tmp_path / "1") == files(tmp_path / "2") == [RECORD, "turn.bap"]
     assert (tmp_path / "1" / "turn.bap").read_bytes() == (tmp_path / "2" / "turn.bap").read_bytes()
     assert record(tmp_path / "1")["turn.bap"] == record(tmp_path / "2")["turn.bap"]
@@ -117,9 +114,7 @@ def test_an_interruption_leaves_whole_files(run: Run, tmp_path: Path, number: si
     assert len(digests) == 1
     for name in range(30, 300):  # the rest, in less time
         (captures / f"talk{name:03}.fap").unlink()
-    code, printed, _ = run("convert", "--batch", captures, out, "--to", "fba", "--jobs", 1)
-    assert code == 0
-    assert "0 failed" in printed
+    assert "0 failed" in run("convert", "--batch", captures, out, "--to", "fba", "--jobs", 1).out
     assert {f"talk{name:03}.fba" for name in range(30)} <= set(files(out))
 
 
@@ -144,39 +139,34 @@ def test_wrong_usage(
     run: Run, captures: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
 ) -> None:
     monkeypatch.chdir(captures.parent)
-    code, _, err = run("convert", *arguments)
-    assert code == 2
-    assert message in " ".join(err.split())
+    assert message in " ".join(run("convert", *arguments, code=2).err.split())
     assert not (captures.parent / "out").exists()
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
-    [("a,b\n1,2\n", "is no table of conversions"), ("", "is no table of conversions")],
+    ("content", "message"), [("a,b\n1,2\n", "is no table of conversions"), ("", "is no table of conversions")]
 )
 def test_another_table_in_the_folder(
     run: Run, captures: Path, tmp_path: Path, content: str, message: str
 ) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / RECORD).write_text(content)
-    code, _, err = run("convert", "--batch", captures, tmp_path / "out", "--to", "fba", "--jobs", 1)
-    assert code == 1
+    err = run("convert", "--batch", captures, tmp_path / "out", "--to", "fba", "--jobs", 1, code=1).err
     assert message in err
     assert (tmp_path / "out" / RECORD).read_text() == content
 
 
 def test_a_table_that_was_cut_off(run: Run, captures: Path, tmp_path: Path) -> None:
     arguments = ("convert", "--batch", captures, tmp_path / "out", "--to", "fba", "--jobs", 1)
-    run(*arguments)
+    run(*arguments, code=1)
     table = tmp_path / "out" / RECORD
     table.write_text(table.read_text() + 'turn.bap,"tu')
-    assert "0 converted, 2 there before" in run(*arguments)[1]
+    assert "0 converted, 2 there before" in run(*arguments, code=1).out
 
 
 def write_still_heads(folder: Path, count: int) -> None:
     """Write tables of Live Link whose heads never turn: a warning for each."""
     talk = fba.read(SAMPLES / "hello.fap")
-    assert talk.face is not None
     values = talk.face.values.copy()
     values[:, 22:26] = values[:, 47:50] = 0
     still = replace(talk, face=replace(talk.face, values=values))
@@ -190,8 +180,7 @@ def test_a_warning_of_many_files_is_said_once(run: Run, tmp_path: Path, jobs: in
     write_still_heads(tmp_path / "in", 5)
     shutil.copy(SAMPLES / "hello.fap", tmp_path / "in")
     arguments = ("convert", "--batch", tmp_path / "in", tmp_path / "out", "--to", "fba", "--jobs", jobs)
-    code, _, err = run(*arguments)
-    assert code == 0
+    err = run(*arguments).err
     said = [line for line in err.splitlines() if "all angles of head and eyes are 0" in line]
     assert len(said) == 2
     assert said[0].startswith("fba: warning: take0.csv: all angles")
@@ -200,8 +189,7 @@ def test_a_warning_of_many_files_is_said_once(run: Run, tmp_path: Path, jobs: in
     rows = record(tmp_path / "out")
     assert all("all angles of head and eyes are 0" in rows[f"take{number}.csv"][4] for number in range(5))
     assert rows["hello.fap"][4] == ""
-    code, _, err = run(*arguments)  # they are not read again
-    assert (code, err) == (0, "")
+    assert run(*arguments).err == ""  # they are not read again
     assert record(tmp_path / "out") == rows
 
 
@@ -218,7 +206,7 @@ def test_folders_elsewhere(run: Run, captures: Path, tmp_path: Path, memory: Any
     (captures / ".hidden").mkdir()
     shutil.copy(SAMPLES / "hello.fap", captures / ".hidden")
     here = tmp_path / "here"
-    assert run("convert", "--batch", captures, here, "--to", "fba", "--jobs", 1)[0] == 1
+    run("convert", "--batch", captures, here, "--to", "fba", "--jobs", 1, code=1)
     memory.put(str(captures) + "/", "/far/captures", recursive=True)
     shutil.make_archive(str(tmp_path / "all"), "zip", captures.parent, captures.name)
     pairs = [
@@ -229,9 +217,9 @@ def test_folders_elsewhere(run: Run, captures: Path, tmp_path: Path, memory: Any
     ]
     for source, target in pairs:
         arguments = ("convert", "--batch", source, target, "--to", "fba", "--jobs", 1)
-        code, printed, err = run(*arguments)
-        assert (code, "2 converted, 0 there before, 2 failed" in printed) == (1, True), err
-        assert "0 converted, 2 there before, 2 failed" in run(*arguments)[1]
+        printed = run(*arguments, code=1).out
+        assert "2 converted, 0 there before, 2 failed" in printed
+        assert "0 converted, 2 there before, 2 failed" in run(*arguments, code=1).out
         if "://" in str(source):
             assert f"{str(source).rstrip('/')}/bad.fap" in " ".join(printed.split()) or "::" in str(source)
     for found in (
@@ -249,8 +237,7 @@ def test_folders_elsewhere(run: Run, captures: Path, tmp_path: Path, memory: Any
 def test_processes_read_and_write_elsewhere(run: Run, captures: Path, tmp_path: Path) -> None:
     pytest.importorskip("fsspec")
     source, target = f"file://{captures}", f"file://{tmp_path}/out"
-    code, printed, err = run("convert", "--batch", source, target, "--to", "fba", "--jobs", 2)
-    assert code == 1, err
+    printed = run("convert", "--batch", source, target, "--to", "fba", "--jobs", 2, code=1).out
     assert "2 converted, 0 there before, 2 failed" in printed
     assert files(tmp_path / "out") == ["anna/hello.fba", RECORD, "turn.fba"]
     assert f"{source}/bad.fap" in record(tmp_path / "out")["bad.fap"][3]
@@ -269,28 +256,25 @@ def test_a_storage_that_takes_nothing(
 
     monkeypatch.setattr(type(memory), "put_file", fail)
     arguments = ("convert", "--batch", captures, "memory://far/out", "--to", "fba", "--jobs", 1)
-    code, printed, _ = run(*arguments)
-    assert (code, "0 converted, 0 there before, 4 failed" in printed) == (1, True)
+    printed = run(*arguments, code=1).out
+    assert "0 converted, 0 there before, 4 failed" in printed
     assert "could not be written: the line is dead" in " ".join(printed.split())
     assert [name.rpartition("/")[2] for name in memory.find("/far/out")] == [RECORD]
     monkeypatch.undo()
-    assert "2 converted, 0 there before, 2 failed" in run(*arguments)[1]
+    assert "2 converted, 0 there before, 2 failed" in run(*arguments, code=1).out
 
 
 def test_addresses_that_contain_each_other(run: Run, captures: Path, memory: Any) -> None:
     memory.put(str(captures) + "/", "/far/captures", recursive=True)
     for target in ("memory://far/captures", "memory://far/captures/out"):
-        code, _, err = run("convert", "--batch", "memory://far/captures", target, "--to", "fba")
-        assert code == 2
+        err = run("convert", "--batch", "memory://far/captures", target, "--to", "fba", code=2).err
         assert "neither of them in the other" in " ".join(err.split())
-    code, _, err = run("convert", "--batch", "nowhere://a", "memory://far/out", "--to", "fba")
-    assert code != 0
+    err = run("convert", "--batch", "nowhere://a", "memory://far/out", "--to", "fba", code=None).err
     assert "Protocol not known" in err
 
 
 def test_a_folder_without_anything_to_read(run: Run, tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "notes.md").write_text("x")
-    code, _, err = run("convert", "--batch", tmp_path / "in", tmp_path / "out", "--to", "fba")
-    assert code == 1
+    err = run("convert", "--batch", tmp_path / "in", tmp_path / "out", "--to", "fba", code=1).err
     assert "holds no file of a format that is read" in err

@@ -1,9 +1,6 @@
 """`fba find`: building an index, and what it prints and writes for pictures."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +8,9 @@ import pytest
 from PIL import Image
 
 import fba
+from command_line import Run
 from fba.outlines import Index
 from outlined import nodding, raising
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
@@ -36,25 +32,24 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_an_index_is_built(run: Run, made: Path, tmp_path: Path) -> None:
     inputs = (made / "raising.fba", made / "nodding.fap")
     how = ("--views", 4, "--every", 2, "--pitch", 0, "--pitch", 40)
-    code, out, _ = run("find", "--build", tmp_path / "new.npz", *inputs, *how)
-    assert code == 0
+    out = run("find", "--build", tmp_path / "new.npz", *inputs, *how).out
     assert "40 silhouettes, 5 poses from 8 sides, of raising.fba, nodding.fap" in out
     index = Index.load(tmp_path / "new.npz")
     assert {view.pitch for view in index.views} == {0, 40}
     assert [stream.name for stream in index.streams] == ["raising.fba", "nodding.fap"]
-    code, _, err = run("find", "--build", tmp_path / "new.npz", *inputs, "--no-clobber")
-    assert (code, "exists already" in err) == (1, True)
-    report = run("find", "--build", tmp_path / "j.npz", inputs[1], "--views", 1, "--json")[1]
+    assert (
+        "exists already" in run("find", "--build", tmp_path / "new.npz", *inputs, "--no-clobber", code=1).err
+    )
+    report = run("find", "--build", tmp_path / "j.npz", inputs[1], "--views", 1, "--json").out
     assert json.loads(report)["silhouettes"] == 1
 
 
 def test_a_picture_is_found(run: Run, made: Path) -> None:
-    code, out, _ = run("find", made / "5.png", made / "index.npz", "--count", 3)
-    assert code == 0
+    out = run("find", made / "5.png", made / "index.npz", "--count", 3).out
     assert "5.png: raising.fba, frame 5 (2.00 s), from its front (0 degrees), distance 0.000" in out
     assert "from another side: raising.fba, frame" in out
     assert len(out.splitlines()) == 6  # a head and three rows
-    (report,) = json.loads(run("find", made / "5.png", made / "index.npz", "--json")[1])
+    (report,) = json.loads(run("find", made / "5.png", made / "index.npz", "--json").out)
     assert report["found"]["side"] == "front"
     assert len(report["nearest"]) == 10
     assert abs(report["other_side"]["yaw"]) >= 60
@@ -63,22 +58,19 @@ def test_a_picture_is_found(run: Run, made: Path) -> None:
 def test_pictures_become_an_animation(run: Run, made: Path, tmp_path: Path) -> None:
     pictures = [made / f"{number}.png" for number in (0, 2, 5)]
     for target in ("out.bap", "out.fba"):
-        code, out, _ = run(
+        out = run(
             "find", *pictures, made / "index.npz", "-o", tmp_path / target, "--fps", 5, "--in-order"
-        )
-        assert code == 0
+        ).out
         assert f"{target}: 3 frames" in out
         back, source = fba.read(tmp_path / target), raising()
         assert back.rate == 5
-        assert back.body is not None
-        assert source.body is not None
         off = back.body.values.astype(int) - source.body.values[[0, 2, 5]]
         assert np.abs(off).max() <= 170  # half a step of BAPs in streams
 
 
 def test_the_best_are_drawn(run: Run, made: Path, tmp_path: Path) -> None:
     for name, kind in (("best.png", "PNG"), ("best.jpg", "JPEG")):
-        assert run("find", made / "0.png", made / "2.png", made / "index.npz", "-o", tmp_path / name)[0] == 0
+        run("find", made / "0.png", made / "2.png", made / "index.npz", "-o", tmp_path / name)
         with Image.open(tmp_path / name) as image:
             assert (image.format, image.size) == (kind, (11 * 150, 2 * 184))
 
@@ -98,16 +90,16 @@ def test_the_best_are_drawn(run: Run, made: Path, tmp_path: Path) -> None:
 )
 def test_wrong_usage(run: Run, made: Path, monkeypatch: pytest.MonkeyPatch, line: str, text: str) -> None:
     monkeypatch.chdir(made)
-    code, out, err = run("find", *line.split())
-    assert (code, out) == (2, "")
+    _, out, err = run("find", *line.split(), code=2)
+    assert out == ""
     assert text in " ".join(err.split())
 
 
 def test_bad_files(run: Run, made: Path, tmp_path: Path) -> None:
-    code, _, err = run("find", made / "5.png", made / "raising.fba")
-    assert (code, "is not an index of outlines" in err, "fba find --build" in err) == (1, True, True)
-    code, _, err = run("find", made / "raising.fba", made / "index.npz")
-    assert (code, "cannot be read as a picture" in err) == (1, True)
+    err = run("find", made / "5.png", made / "raising.fba", code=1).err
+    assert "is not an index of outlines" in err
+    assert "fba find --build" in err
+    assert "cannot be read as a picture" in run("find", made / "raising.fba", made / "index.npz", code=1).err
     Image.new("RGB", (7000, 6000)).save(tmp_path / "large.png")
-    code, _, err = run("find", tmp_path / "large.png", made / "index.npz", "--limit", "pixels=1000000")
-    assert (code, "--limit pixels=" in err) == (1, True)
+    err = run("find", tmp_path / "large.png", made / "index.npz", "--limit", "pixels=1000000", code=1).err
+    assert "--limit pixels=" in err

@@ -1,9 +1,6 @@
 """`--clip`: the animation that commands read of a glTF file with several."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fba
+from command_line import Run
 from small_people import write_person
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 def raised(degrees: float, frames: int) -> dict[str, list[Rotation]]:
@@ -29,8 +25,7 @@ def people(tmp_path: Path) -> Path:
 
 
 def test_info_lists_the_clips(run: Run, people: Path) -> None:
-    code, out, err = run("info", people)
-    assert code == 0
+    _, out, err = run("info", people)
     assert out.splitlines()[-3].startswith("  clips ")
     assert [line.split()[-3:] for line in out.splitlines()[-3:]] == [
         ["'Idle',", "0.10", "s"],
@@ -46,48 +41,45 @@ def test_info_lists_the_clips(run: Run, people: Path) -> None:
 def test_each_command_reads_the_clip_that_it_is_given(run: Run, people: Path, tmp_path: Path) -> None:
     for word, frames in (("Wave", 7), ("wave", 10), ("idle", 4), ("2", 10)):
         target = tmp_path / "out.bap"
-        assert run("convert", people, target, "--clip", word)[0] == 0
+        run("convert", people, target, "--clip", word)
         assert len(fba.read(target)) == frames
-    code, out, _ = run("info", people, "--clip", "Wave")
-    assert (code, "7 frames" in out) == (0, True)
+    assert "7 frames" in run("info", people, "--clip", "Wave").out
     stream = tmp_path / "out.fba"
-    code, out, err = run(
-        "encode", people, "-o", stream, "--clip", "wave", "--bap-steps", "visage", "--report"
-    )
-    assert code == 0
+    _, out, err = run("encode", people, "-o", stream, "--clip", "wave", "--bap-steps", "visage", "--report")
     assert "animations" not in err
     assert "10 frames beside the source" in out
 
 
 def test_a_missing_clip(run: Run, people: Path, bvh: Path, tmp_path: Path) -> None:
-    code, _, err = run("convert", people, tmp_path / "out.bap", "--clip", "Wafe")
-    assert code == 1
+    err = run("convert", people, tmp_path / "out.bap", "--clip", "Wafe", code=1).err
     assert "no animation 'Wafe'" in err
     assert "did you mean" in err
     assert "'Idle', 'Wave', 'wave'" in err
-    code, _, err = run("convert", people, tmp_path / "out.bap", "--clip", "WAVE")
-    assert code == 1
+    err = run("convert", people, tmp_path / "out.bap", "--clip", "WAVE", code=1).err
     assert "2 animations are called 'WAVE'; give a number: 1, 2; choose with --clip 1" in err
-    code, _, err = run("encode", bvh, "-o", tmp_path / "out.fba", "--clip", "Wave")
-    assert code == 2
+    err = run("encode", bvh, "-o", tmp_path / "out.fba", "--clip", "Wave", code=2).err
     assert "--clip is for glTF, which may hold several animations, not for BVH" in err
 
 
 def test_a_warning_is_printed_once(run: Run, people: Path, tmp_path: Path) -> None:
     """`--report` reads the file a second time."""
-    code, _, err = run("encode", people, "-o", tmp_path / "out.fba", "--report")
-    assert (code, err.count("'Idle' is read; choose with --clip Wave")) == (0, 1)
+    assert (
+        run("encode", people, "-o", tmp_path / "out.fba", "--report").err.count(
+            "'Idle' is read; choose with --clip Wave"
+        )
+        == 1
+    )
 
 
 def test_info_of_a_person_without_motion(run: Run, tmp_path: Path) -> None:
     path = write_person(tmp_path / "avatar.vrm", extension="VRM", morphs={"jawOpen": [0.0], "Wobble": [0.0]})
-    code, out, err = run("info", path)
-    assert (code, err) == (0, "")
+    _, out, err = run("info", path)
+    assert err == ""
     assert "23 of 23 joints are the standard's, as VRM 0 declares them" in out
     assert "1; 1 shapes of a face" in out
     assert f"fba play MOTION --body {path}" in out
     listed = json.loads(run("info", path, "--json").out)["person"]  # type: ignore[attr-defined]
-    code, out, err = run("info", path, "--clip", "3")
-    assert (code, out) == (1, "")
+    _, out, err = run("info", path, "--clip", "3", code=1)
+    assert out == ""
     assert "there is no animation '3'; the file has none" in err
     assert listed == {"declared": "VRM 0", "joints": 23, "matched": 23, "meshes": 1, "shapes": 1}

@@ -1,22 +1,18 @@
 """`fba encode` of a face, a body and a voice that were recorded at one moment."""
 
-from __future__ import annotations
-
 import json
 import wave
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import fba
+from command_line import Run
 from fba import Animation
 from sound_clicks import write_click
 from tools.captures.face_files import ANGLES, UDP_ORDER, livelink_csv
 
-Run = Callable[..., Any]
 START = 67_739.5
 """Time of day of the first row, 18:48:59:30."""
 
@@ -43,7 +39,6 @@ def bap(tmp_path: Path, body: Animation) -> Path:
 def test_face_and_body(run: Run, table: Path, bap: Path, tmp_path: Path) -> None:
     out = tmp_path / "both.fba"
     done = run("encode", table, bap, "-o", out, "--offset", "0.5", "--no-mark")
-    assert done.code == 0, done.err
     spans = f"{table} 0.00 to 2.00 s, {bap} 0.50 to 2.47 s; both from 0.50 to 2.00 s"
     assert f"together, by --offset: {spans}" in done.out
     assert f"{bap}: 25 frames/s, interpolated at 60" in done.out
@@ -59,10 +54,8 @@ def test_face_and_body(run: Run, table: Path, bap: Path, tmp_path: Path) -> None
 def test_the_body_begins_at_a_time_code(run: Run, table: Path, bap: Path, tmp_path: Path) -> None:
     for code in ("18:49:00:00", "18:49:00.000"):
         done = run("encode", table, bap, "-o", tmp_path / "a.fba", "--offset", code)
-        assert done.code == 0, done.err
         assert f"together, by their time codes: {table} 0.00 to 2.00 s, {bap} 0.50 to 2.47 s" in done.out
     done = run("encode", table, bap, "-o", tmp_path / "a.fba", "--sync", "timecode")
-    assert done.code == 0
     assert "no time code in" in done.err
     assert "both begin together; say when the second one begins with --offset 2.4" in done.err
 
@@ -81,24 +74,24 @@ def test_the_body_begins_at_a_time_code(run: Run, table: Path, bap: Path, tmp_pa
 def test_impossible_options_are_refused(
     run: Run, table: Path, bap: Path, tmp_path: Path, options: tuple[str, ...], message: str
 ) -> None:
-    done = run("encode", table, bap, "-o", tmp_path / "a.fba", *options)
+    done = run("encode", table, bap, "-o", tmp_path / "a.fba", *options, code=None)
     assert done.code in (1, 2)
     assert message in done.err
     assert not (tmp_path / "a.fba").exists()
 
 
 def test_two_faces_and_one_input(run: Run, table: Path, tmp_path: Path) -> None:
-    done = run("encode", table, table, "-o", tmp_path / "a.fba")
-    assert (done.code, "a second face file" in done.err) == (2, True)
-    done = run("encode", table, "-o", tmp_path / "a.fba", "--sync", "timecode")
-    assert (done.code, "--sync is for two inputs" in done.err) == (2, True)
+    assert "a second face file" in run("encode", table, table, "-o", tmp_path / "a.fba", code=2).err
+    assert (
+        "--sync is for two inputs"
+        in run("encode", table, "-o", tmp_path / "a.fba", "--sync", "timecode", code=2).err
+    )
 
 
 def test_a_report_compares_what_the_body_covers(run: Run, table: Path, bvh: Path, tmp_path: Path) -> None:
     """The body is three frames at 10 frames a second; with --trim, its first 0.1 s are left out."""
     for offset, options in (("1.0", ()), ("-0.1", ("--trim",))):
         done = run("encode", table, bvh, "-o", tmp_path / "a.fba", "--offset", offset, "--report", *options)
-        assert done.code == 0, done.err
         frames = 13 if not options else 7
         assert f"{bvh}: {frames} frames beside the source" in done.out
         line = next(line for line in done.out.splitlines() if line.strip().startswith("direction"))
@@ -126,7 +119,6 @@ def test_a_voice(run: Run, table: Path, tmp_path: Path) -> None:
     voice = write_click(tmp_path / "speech.wav", 1.0, seconds=3.0)
     out = tmp_path / "talk.fba"
     done = run("encode", table, "-o", out, "--audio", voice)
-    assert done.code == 0, done.err
     assert f"{tmp_path / 'talk.wav'}: 2.00 s of {voice}, from 0.00 s on, both from the start on" in done.out
     assert click(tmp_path / "talk.wav") == pytest.approx((1.0, 2.0), abs=1e-3)
     done = run("encode", table, "-o", out, "--audio", voice, "--audio-offset", "-0.25", "--json")
@@ -153,12 +145,9 @@ def test_voices_that_do_not_fit(run: Run, table: Path, tmp_path: Path) -> None:
         (("-o", "-", "--audio", voice), "give the stream a name with -o"),
         (("-o", tmp_path / "a.fba", "--audio-offset", "1"), "--audio-offset needs a sound"),
         (("-o", tmp_path / "a.fba", "--audio", table), "cannot be read as sound"),
-        (
-            ("-o", tmp_path / "a.fba", "--audio", voice),
-            "lasts from 18:49:59.50 to 18:50:00.50, and",
-        ),
+        (("-o", tmp_path / "a.fba", "--audio", voice), "lasts from 18:49:59.50 to 18:50:00.50, and"),
     ):
-        done = run("encode", table, *options)
+        done = run("encode", table, *options, code=None)
         assert done.code in (1, 2)
         assert message in done.err
     assert not (tmp_path / "a.wav").exists()

@@ -1,24 +1,20 @@
 """`fba gait`: what it writes and prints, and how it fails."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fba
+from command_line import Run
 from fba.body import gait
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 def test_writes_a_walk(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "walk.bap"
-    code, out, err = run("gait", "--stride", 0.7, "--character", "bored", "-o", path)
-    assert (code, err) == (0, "")
+    _, out, err = run("gait", "--stride", 0.7, "--character", "bored", "-o", path)
+    assert err == ""
     assert "bored" in out
     assert "2.80 m at 0.50 m/s" in out
     wanted = gait.walk(0.7, "bored")
@@ -27,12 +23,9 @@ def test_writes_a_walk(run: Run, tmp_path: Path) -> None:
 
 def test_writes_streams_and_says_what_their_steps_do(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "walk.fba"
-    code, _, err = run("gait", "--cycles", 1, "-o", path, "--bap-steps", "iso")
-    assert code == 0
-    assert "--bap-steps visage" in err
+    assert "--bap-steps visage" in run("gait", "--cycles", 1, "-o", path, "--bap-steps", "iso").err
     assert len(fba.read(path)) == 33
-    code, _, err = run("gait", "--cycles", 1, "-o", path)
-    assert (code, err) == (0, "")
+    assert run("gait", "--cycles", 1, "-o", path).err == ""
     decoded = fba.read(path).body.values.astype(int)
     apart = np.abs(decoded - gait.walk(cycles=1).body.values)
     assert apart[:, 180:183].max() <= 1  # steps of 2 mm
@@ -41,30 +34,22 @@ def test_writes_streams_and_says_what_their_steps_do(run: Run, tmp_path: Path) -
 
 def test_lengths_and_rates(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "walk.bap"
-    assert run("gait", "--seconds", 2, "--fps", 25, "-o", path)[0] == 0
+    run("gait", "--seconds", 2, "--fps", 25, "-o", path)
     walk = fba.read(path)
     assert (len(walk), walk.rate) == (50, 25)
-    code, out, _ = run("gait", "--in-place", "--cycles", 1, "-o", path)
-    assert code == 0
-    assert "m/s" not in out
+    assert "m/s" not in run("gait", "--in-place", "--cycles", 1, "-o", path).out
 
 
 def test_lists_characters(run: Run) -> None:
-    code, out, _ = run("gait", "--list")
-    assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == list(gait.characters())
-    code, out, _ = run("gait", "--list", "--json")
-    assert [row["name"] for row in json.loads(out)] == list(gait.characters())
+    assert [line.split()[0] for line in run("gait", "--list").out.splitlines()] == list(gait.characters())
+    assert [row["name"] for row in json.loads(run("gait", "--list", "--json").out)] == list(gait.characters())
 
 
 def test_finds_steps(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "walk.bap"
     run("gait", "--cycles", 2, "-o", path)
-    code, out, _ = run("gait", "--find", path)
-    assert code == 0
-    assert out.startswith("4 steps, 3 cycles")
-    code, out, _ = run("gait", "--find", path, "--json")
-    found = json.loads(out)
+    assert run("gait", "--find", path).out.startswith("4 steps, 3 cycles")
+    found = json.loads(run("gait", "--find", path, "--json").out)
     assert [step["side"] for step in found["steps"]] == ["right", "left", "right", "left"]
     assert found["cycles"][0]["seconds"] == pytest.approx(32 / 30)
 
@@ -93,15 +78,11 @@ def test_errors_are_one_line(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[object], code: int, text: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    got, _, err = run("gait", *arguments)
-    assert got == code
-    assert text in err.splitlines()[-1]
+    assert text in run("gait", *arguments, code=code).err.splitlines()[-1]
     assert not list(tmp_path.iterdir())
 
 
 def test_a_face_does_not_walk(run: Run, tmp_path: Path, face: fba.Animation) -> None:
     path = tmp_path / "face.fap"
     fba.write(path, face)
-    code, _, err = run("gait", "--find", path)
-    assert code == 1
-    assert "no body" in err
+    assert "no body" in run("gait", "--find", path, code=1).err

@@ -1,9 +1,6 @@
 """`--map` and `--map-out`: joints of captures that names do not tell, and maps in TOML files."""
 
-from __future__ import annotations
-
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fba
+from command_line import Run
 from fba.parameters import bap_numbers
 from small_people import BONES, write_person
 
-Run = Callable[..., tuple[int, str, str]]
 STEPS = ("--bap-steps", "visage")
 RIDDLES = {bone: f"n{number}" for number, bone in enumerate(BONES)}
 """Names that say nothing."""
@@ -50,41 +47,36 @@ def test_a_unit_that_limbs_do_not_tell(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "half.bvh"
     path.write_text("\n".join(["HIERARCHY", *lines, "}", "MOTION", "Frames: 2", "Frame Time: 0.04", *rows]))
     given = ["--map", "Hips=HumanoidRoot", "--map", "LeftUpLeg=l_hip", "--map", "RightUpLeg=r_hip"]
-    code, _, err = run("encode", path, "-o", tmp_path / "half.fba", *given)
-    assert code == 0
+    err = run("encode", path, "-o", tmp_path / "half.fba", *given).err
     assert "its unit is unknown; taken as centimetres; give another, in metres, with --scale 0.001" in err
     assert "off their path" not in err
-    code, _, err = run("encode", path, "-o", tmp_path / "half.fba", *given, "--scale", "0.02")
-    assert code == 0
+    err = run("encode", path, "-o", tmp_path / "half.fba", *given, "--scale", "0.02").err
     assert "unit" not in err
     assert "off their path" not in err
     body = fba.read(tmp_path / "half.fba").body
-    assert body is not None
     assert np.ptp(body.values[:, bap_numbers()["HumanoidRoot_tr_lateral"] - 1]) == pytest.approx(1000, abs=3)
 
 
 def test_matched_joints_are_saved_and_read_again(run: Run, tmp_path: Path) -> None:
     source, saved = person(tmp_path / "p.glb"), tmp_path / "map.toml"
-    code, out, _ = run("encode", source, "-o", tmp_path / "one.fba", *STEPS, "--map-out", saved)
-    assert code == 0
+    out = run("encode", source, "-o", tmp_path / "one.fba", *STEPS, "--map-out", saved).out
     found = tomllib.loads(saved.read_text())["joints"]
     assert f"{saved}: {len(found)} joints of {source}" in out
     assert found.items() >= LIMBS.items()
     assert "# Joints of the standard that are free: sacroiliac" in saved.read_text()
-    assert run("encode", source, "-o", tmp_path / "two.fba", *STEPS, "--map", saved)[0] == 0
+    run("encode", source, "-o", tmp_path / "two.fba", *STEPS, "--map", saved)
     assert (tmp_path / "one.fba").read_bytes() == (tmp_path / "two.fba").read_bytes()
 
 
 def test_pairs_name_joints_that_names_do_not_tell(run: Run, tmp_path: Path) -> None:
     riddle = person(tmp_path / "riddle.glb", RIDDLES)
-    code, _, err = run("encode", riddle, "-o", tmp_path / "out.fba", *STEPS)
-    assert code == 1
+    err = run("encode", riddle, "-o", tmp_path / "out.fba", *STEPS, code=1).err
     assert "name each joint's counterpart in the standard with --map Pelvis=HumanoidRoot" in err
     pairs = [word for bone, joint in LIMBS.items() for word in ("--map", f"{RIDDLES[bone]}={joint}")]
-    assert run("encode", riddle, "-o", tmp_path / "out.fba", *STEPS, *pairs)[0] == 0
+    run("encode", riddle, "-o", tmp_path / "out.fba", *STEPS, *pairs)
     plain = person(tmp_path / "plain.glb")
     left_out = [word for bone in BONES if bone not in LIMBS for word in ("--map", f"{bone}=")]
-    assert run("encode", plain, "-o", tmp_path / "plain.fba", *STEPS, *left_out)[0] == 0
+    run("encode", plain, "-o", tmp_path / "plain.fba", *STEPS, *left_out)
     assert (tmp_path / "out.fba").read_bytes() == (tmp_path / "plain.fba").read_bytes()
 
 
@@ -92,7 +84,7 @@ def test_pairs_change_what_is_found(run: Run, tmp_path: Path) -> None:
     """The names of VRM serve for the standard's; a joint that loses its place moves nothing."""
     source, saved = person(tmp_path / "p.glb"), tmp_path / "map.toml"
     given = ("--map", "leftHand=leftLowerArm", "--map", "rightToes=", "--map-out", saved)
-    assert run("encode", source, "-o", tmp_path / "out.fba", *STEPS, *given)[0] == 0
+    run("encode", source, "-o", tmp_path / "out.fba", *STEPS, *given)
     joints = tomllib.loads(saved.read_text())["joints"]
     assert joints["leftHand"] == "l_elbow"
     assert "leftLowerArm" not in joints
@@ -117,9 +109,7 @@ def test_pairs_change_what_is_found(run: Run, tmp_path: Path) -> None:
 def test_bad_files(run: Run, tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "map.toml").write_text(text)
     source = person(tmp_path / "p.glb")
-    code, _, err = run("convert", source, tmp_path / "out.bap", "--map", tmp_path / "map.toml")
-    assert code == 1
-    assert message in err
+    assert message in run("convert", source, tmp_path / "out.bap", "--map", tmp_path / "map.toml", code=1).err
 
 
 def test_mistakes(run: Run, tmp_path: Path) -> None:
@@ -134,8 +124,8 @@ def test_mistakes(run: Run, tmp_path: Path) -> None:
         ((fap, "--map", "hips=HumanoidRoot"), "--map goes with motion capture"),
         ((fap, "--map-out", tmp_path / "m.toml"), "--map-out goes with motion capture"),
     ):
-        code, _, err = run("encode", *words, "-o", tmp_path / "out.fba", *STEPS)
-        assert (code, message in err) == (2, True), err
+        err = run("encode", *words, "-o", tmp_path / "out.fba", *STEPS, code=2).err
+        assert message in err
     assert not (tmp_path / "out.fba").exists()
 
 
@@ -143,12 +133,10 @@ def test_joints_of_a_body_that_is_shown(run: Run, tmp_path: Path) -> None:
     """`--map` names the joints of `--body` where the input is no capture."""
     riddle = write_person(tmp_path / "p.glb", names=RIDDLES)
     walk, out = tmp_path / "walk.bap", tmp_path / "out.glb"
-    assert run("gait", "--cycles", 1, "-o", walk)[0] == 0
-    code, _, err = run("convert", walk, out, "--body", riddle)
-    assert code == 1
-    assert "--map" in err
+    run("gait", "--cycles", 1, "-o", walk)
+    assert "--map" in run("convert", walk, out, "--body", riddle, code=1).err
     maps = [word for bone, joint in LIMBS.items() for word in ("--map", f"{RIDDLES[bone]}={joint}")]
-    assert run("convert", walk, out, "--body", riddle, *maps)[0] == 0
+    run("convert", walk, out, "--body", riddle, *maps)
     assert out.stat().st_size > 10_000
     for words, message in (
         (("render", walk, "--map", "a=l_hip", "-o", "a.png"), "--map names the joints of a --body: give one"),
@@ -157,14 +145,14 @@ def test_joints_of_a_body_that_is_shown(run: Run, tmp_path: Path) -> None:
             "--map: the skeleton has no joint 'n99'",
         ),
     ):
-        code, _, err = run(*words)
-        assert (code, message in err) == (2, True), err
+        err = run(*words, code=2).err
+        assert message in err
 
 
 def test_joints_of_hands_are_matched(run: Run, tmp_path: Path) -> None:
     saved = tmp_path / "map.toml"
     source = person(tmp_path / "p.glb")
-    assert run("encode", source, "-o", tmp_path / "out.fba", *STEPS, "--map-out", saved)[0] == 0
+    run("encode", source, "-o", tmp_path / "out.fba", *STEPS, "--map-out", saved)
     joints = tomllib.loads(saved.read_text())["joints"]
     assert joints["leftMiddleProximal"] == "l_middle1"
     assert np.array_equal(sorted(joints.values()), sorted(set(joints.values())))

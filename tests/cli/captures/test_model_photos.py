@@ -1,9 +1,6 @@
 """`fba model photos`: from pictures and points to a head, what is said, and what is refused."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from command_line import Run
 from fba.face import FaceModel
 from fba.face.fitting import FRONT_POINTS, _skin, write_photo_points
 from fba.face.fitting._views import View
@@ -18,8 +16,6 @@ from fba.mesh import read_pixels
 from fba.parameters import point_rows
 from fba_player.scene._photo_editing import PhotoEditing
 from fba_player.window import pages
-
-Run = Callable[..., Any]
 
 
 @pytest.fixture
@@ -36,8 +32,8 @@ def photo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_head_is_made_and_measured(run: Run, photo: Path) -> None:
     points, out_file = photo.with_name("ada.points.json"), photo.with_name("ada.glb")
-    code, out, err = run("model", "photos", photo, "-o", out_file, "--points", points, "--eyes", "65mm")
-    assert (code, err) == (0, "")
+    _, out, err = run("model", "photos", photo, "-o", out_file, "--points", points, "--eyes", "65mm")
+    assert err == ""
     head = FaceModel.load(out_file)
     assert head.name == "ada"
     pupils = head.points[[point_rows()["3.5"], point_rows()["3.6"]]]
@@ -45,8 +41,7 @@ def test_a_head_is_made_and_measured(run: Run, photo: Path) -> None:
     assert "front ada.png: 40 points, 0.0 mm off on average; camera 0 degrees" in out
     assert out.count("    profile ") == 6
     assert out.count("    front ") == 8
-    code, out, _ = run("model", "photos", photo, "-o", out_file, "--points", points, "--json")
-    assert code == 0
+    out = run("model", "photos", photo, "-o", out_file, "--points", points, "--json").out
     assert len(json.loads(out)["measures"]) == 14
 
 
@@ -54,9 +49,8 @@ def test_a_bald_head_has_no_hair(run: Run, photo: Path) -> None:
     points, dark = photo.with_name("ada.points.json"), {}
     for hair in ("keep", "none"):
         out_file = photo.with_name(f"{hair}.glb")
-        assert run("model", "photos", photo, "-o", out_file, "--points", points, "--hair", hair)[0] == 0
+        run("model", "photos", photo, "-o", out_file, "--points", points, "--hair", hair)
         pixels = read_pixels(FaceModel.load(out_file).part("skin").material.texture or b"")
-        assert pixels is not None
         dark[hair] = float((pixels[..., :3].mean(axis=2) < 70).mean())
     assert dark["none"] < 0.3 * dark["keep"]
 
@@ -76,12 +70,9 @@ def test_points_are_edited_before_the_head_is_made(
     monkeypatch.setattr(pages, "check_page", lambda subject: None)
     monkeypatch.setattr(pages, "place_photo_points", show)
     words = ("model", "photos", photo, "-o", photo.with_name("a.glb"), "--points", points, "--edit", edited)
-    code, out, _ = run(*words)
-    assert code == 1
-    assert "closed without saving" in out
+    assert "closed without saving" in run(*words, code=1).out
     assert not photo.with_name("a.glb").exists()
-    code, _, _ = run(*words)
-    assert code == 0
+    run(*words)
     assert edited.exists()
     assert photo.with_name("a.glb").exists()
 
@@ -98,7 +89,7 @@ def test_points_that_are_not_found_are_dragged_from_a_template(
     monkeypatch.setattr(pages, "check_page", lambda subject: None)
     monkeypatch.setattr(pages, "place_photo_points", show)
     words = ("model", "photos", photo, photo, "-o", photo.with_name("a.glb"))
-    assert run(*words, "--edit", photo.with_name("new.json"))[0] == 1
+    run(*words, "--edit", photo.with_name("new.json"), code=1)
     assert set(shown[0]["front"]) == set(FRONT_POINTS)
     assert 0 < shown[0]["front"]["2.1"][1] < 600
     assert 0 < shown[0]["side"]["9.3"][0] < shown[0]["side"]["10.5"][0] < 500
@@ -106,19 +97,14 @@ def test_points_that_are_not_found_are_dragged_from_a_template(
 
 def test_mistakes_are_told(run: Run, photo: Path) -> None:
     out_file = photo.with_name("a.glb")
-    code, _, err = run("model", "photos", photo, "-o", out_file)
-    assert code == 1
-    assert "no face was found" in err
+    assert "no face was found" in run("model", "photos", photo, "-o", out_file, code=1).err
     assert not out_file.exists()
-    code, _, err = run("model", "photos", photo, "-o", out_file, "--edit", photo.with_name("p.csv"))
-    assert code == 2
+    err = run("model", "photos", photo, "-o", out_file, "--edit", photo.with_name("p.csv"), code=2).err
     assert "name it .json" in err
-    code, _, err = run("model", "photos", photo, "-o", photo)
-    assert code == 2
+    run("model", "photos", photo, "-o", photo, code=2)
     points = photo.with_name("ada.points.json")
     content = json.loads(points.read_text())
     content["side"] = {"points": {"9.3": [1, 2]}}
     points.write_text(json.dumps(content))
-    code, _, err = run("model", "photos", photo, "-o", out_file, "--points", points)
-    assert code == 2
+    err = run("model", "photos", photo, "-o", out_file, "--points", points, code=2).err
     assert "give the profile as SIDE" in err

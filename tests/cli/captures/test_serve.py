@@ -1,7 +1,5 @@
 """`fba serve` and `fba capture --serve`, from the command line to a viewer."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -9,7 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -21,12 +19,12 @@ from websockets.exceptions import ConnectionClosed, ConnectionClosedOK
 from websockets.sync.client import ClientConnection, connect
 
 import fba
+from command_line import Run
 from fba.codec import Decoder, encode_animation
 from joinable_streams import JOINABLE, performance
 from started_programs import started
 from tools.captures.face_files import datagram
 
-Run = Callable[..., Any]
 LOCAL = "127.0.0.1"
 STREAM = encode_animation(performance(), JOINABLE)[0]
 
@@ -84,9 +82,7 @@ def test_files_are_shown_until_a_signal(tmp_path: Path, number: int) -> None:
         assert texts[0] == {"event": "hello", "streams": ["a <b>.fba", "b.fap"], "stream": 0}
         assert [one["event"] for one in texts] == ["hello", "start", "end"]
         shown = fba.decode(b"".join(data))
-        assert shown.body is not None
         whole = fba.decode(STREAM)
-        assert whole.body is not None
         np.testing.assert_array_equal(shown.body.values, whole.body.values)
         texts, data = watch(address, "stream?n=1")
         assert texts[0]["stream"] == 1
@@ -98,7 +94,6 @@ def test_files_are_shown_until_a_signal(tmp_path: Path, number: int) -> None:
 def test_standard_input_ends_it() -> None:
     with serving("serve", "-", "--port", 0, "--host", LOCAL, stdin=subprocess.PIPE) as (program, address):
         assert re.fullmatch(r"ws://127\.0\.0\.1:\d+/[\w-]{20,}/", address)
-        assert program.stdin is not None
         with connect(address + "stream", compression=None, proxy=None) as viewer:
             assert json.loads(viewer.recv(timeout=120))["streams"] == ["standard input"]
             program.stdin.buffer.write(STREAM)
@@ -135,7 +130,6 @@ def test_a_capture_goes_out_as_it_comes(tmp_path: Path) -> None:
             frames += arriving(viewer, decoder)
         assert program.wait(60) == 0
     recorded = fba.read(path)
-    assert recorded.face is not None
     values = np.concatenate([frame.face.values for frame in frames if frame.face is not None])
     np.testing.assert_array_equal(values, recorded.face.values)
 
@@ -150,9 +144,7 @@ def test_a_capture_goes_out_as_it_comes(tmp_path: Path) -> None:
     ],
 )
 def test_mistakes(run: Run, arguments: list[str], said: str) -> None:
-    result = run(*arguments)
-    assert result.code == 2
-    assert said in result.err
+    assert said in run(*arguments, code=2).err
 
 
 def test_ports_that_cannot_be_had_and_a_missing_package(
@@ -162,16 +154,12 @@ def test_ports_that_cannot_be_had_and_a_missing_package(
     path.write_bytes(STREAM)
     with socket.create_server((LOCAL, 0)) as taken:
         port = taken.getsockname()[1]
-        result = run("serve", path, "--port", port)
-        assert result.code == 1
+        result = run("serve", path, "--port", port, code=1)
         assert f"127.0.0.1, port {port}: cannot be listened on: " in result.err
         assert "give another port" in result.err
-    result = run("serve", path, "--host", "no.such.host.invalid")
-    assert result.code == 1
+    result = run("serve", path, "--host", "no.such.host.invalid", code=1)
     assert "give an address of this computer" in result.err
     (tmp_path / "b.fba").write_bytes(b"hello")
-    assert run("serve", tmp_path / "b.fba", "--from", "fba").code == 1
+    run("serve", tmp_path / "b.fba", "--from", "fba", code=1)
     monkeypatch.setitem(sys.modules, "websockets.asyncio.server", None)
-    result = run("serve", path)
-    assert result.code == 1
-    assert "[serve]" in result.err
+    assert "[serve]" in run("serve", path, code=1).err

@@ -1,11 +1,8 @@
 """MP4 files on the command line: converted with sound and back, and read by all commands for streams."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import wave
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -15,6 +12,7 @@ import numpy as np
 import pytest
 
 import fba
+from command_line import Run
 from fba.arrays import Float64
 from fba.audio import SoundFile
 from fba.carriage.mp4 import list_tracks, read_mp4, write_mp4
@@ -24,7 +22,6 @@ from fba_player.sound.coded_sound import read_coded_sound
 from joinable_streams import JOINABLE, performance
 from mp4_files import Track, whole_file
 
-Run = Callable[..., Any]
 RATE = 16_000
 SECONDS = 3
 
@@ -75,20 +72,20 @@ def test_sound_is_heard_when_it_is_due(
     target = stream.with_suffix(".fba.mp4")
     options = ["--audio", voice, "--audio-codec", coding, "--audio-offset", offset, *fragment]
     done = run("convert", stream, target, *options)
-    assert (done.code, done.err.count("\n")) == (0, 1)  # the table of BAP steps
+    assert done.err.count("\n") == 1  # the table of BAP steps
     assert f"with the sound of {voice} as {'AAC' if coding == 'aac' else 'Opus'}" in done.out
     begin, likeness = fit(target)
     assert abs(begin - offset) < 0.002
     assert likeness > 0.98
     assert find_offset(target, (target,), SoundOptions()) == pytest.approx(SoundFile(target).start)
     back = stream.with_name("back.fba")
-    assert run("convert", target, back).code == 0
+    run("convert", target, back)
     assert back.read_bytes() == stream.read_bytes()
 
 
 def test_sound_that_begins_before_the_first_frame(run: Run, stream: Path, voice: Path) -> None:
     target = stream.with_suffix(".mp4")
-    assert run("convert", stream, target, "--audio", voice, "--audio-offset", -0.5).code == 0
+    run("convert", stream, target, "--audio", voice, "--audio-offset", -0.5)
     with SoundFile(target) as sound:
         assert abs(len(sound.read(0, 10 * RATE)) / sound.rate - (SECONDS - 0.5)) < 0.1
         assert sound.start == 0
@@ -101,7 +98,7 @@ def test_sound_may_be_longer_and_shorter_than_the_stream(
     source, target = tmp_path / "part.fba", tmp_path / "part.mp4"
     source.write_bytes(encode_animation(replace(performance()[:frames], rate=Fraction(5)))[0])
     for fragment in ((), ("--fragment", 1)):
-        assert run("convert", source, target, "--audio", voice, *fragment).code == 0
+        run("convert", source, target, "--audio", voice, *fragment)
         assert len(fba.read(target)) == frames
         with SoundFile(target) as sound:
             assert abs(len(sound.read(0, 10 * RATE)) / sound.rate - SECONDS) < 0.15
@@ -111,21 +108,21 @@ def test_coded_sound_is_copied(run: Run, stream: Path, voice: Path, tmp_path: Pa
     first, second = tmp_path / "first.mp4", tmp_path / "second.mp4"
     for coding in ("aac", "opus"):
         run("convert", stream, first, "--audio", voice, "--audio-codec", coding, "--audio-offset", 0.25)
-        assert run("convert", first, second, "--fragment", 1).code == 0  # its own sound goes along
+        run("convert", first, second, "--fragment", 1)  # its own sound goes along
         packets = read_coded_sound(first).packets
         assert len(packets) > 30
         assert read_coded_sound(second).packets == packets
         assert second.read_bytes().count(packets[5]) == 1
         assert abs(fit(second)[0] - 0.25) < 0.002
-    assert run("convert", first, second, "--no-audio").code == 0
+    run("convert", first, second, "--no-audio")
     assert len(list_tracks(second.read_bytes())) == 1
-    assert run("convert", first, second, "--audio-codec", "aac").code == 0
+    run("convert", first, second, "--audio-codec", "aac")
     assert list_tracks(second.read_bytes())[1].coding == "AAC"
 
 
 def test_all_commands_read_them(run: Run, stream: Path, tmp_path: Path) -> None:
     film = tmp_path / "film.mp4"
-    assert run("convert", stream, film, "--no-audio").code == 0
+    run("convert", stream, film, "--no-audio")
     for command in ("verify", "stats"):
         of_stream, of_film = (json.loads(run(command, "--json", path).out) for path in (stream, film))
         assert {**of_film, "file": ""} == {**of_stream, "file": ""}
@@ -139,12 +136,9 @@ def test_all_commands_read_them(run: Run, stream: Path, tmp_path: Path) -> None:
     assert [track["coding"] for track in report["tracks"]] == ["FBA"]
     assert report["bap_steps_choice"] == "visage: the stream says so"
     for path, name in ((stream, "a"), (film, "b")):
-        assert (
-            run("decode", path, "--fap", tmp_path / f"{name}.fap", "--bap", tmp_path / f"{name}.bap").code
-            == 0
-        )
-        assert run("encode", path, "-o", tmp_path / f"{name}.fba").code == 0
-        assert run("export", path, "-o", tmp_path / f"{name}.html", "--title", "x").code == 0
+        run("decode", path, "--fap", tmp_path / f"{name}.fap", "--bap", tmp_path / f"{name}.bap")
+        run("encode", path, "-o", tmp_path / f"{name}.fba")
+        run("export", path, "-o", tmp_path / f"{name}.html", "--title", "x")
     for suffix in ("fap", "bap", "fba"):
         contents = [(tmp_path / f"{name}.{suffix}").read_bytes() for name in "ab"]
         assert contents[0].replace(b" talk ", b" film ") == contents[1]
@@ -155,8 +149,8 @@ def test_all_commands_read_them(run: Run, stream: Path, tmp_path: Path) -> None:
 
 def test_a_page_takes_the_sound_alone(run: Run, stream: Path, voice: Path, tmp_path: Path) -> None:
     film, page = tmp_path / "film.mp4", tmp_path / "film.html"
-    assert run("convert", stream, film, "--audio", voice, "--audio-offset", 0.5).code == 0
-    assert run("export", film, "-o", page).code == 0
+    run("convert", stream, film, "--audio", voice, "--audio-offset", 0.5)
+    run("export", film, "-o", page)
     text = page.read_text()
     assert '"audio": "data:audio/mp4;base64,' in text
     assert '"audioOffset": 0.5' in text
@@ -178,22 +172,22 @@ def test_the_sound_of_the_file_comes_before_the_one_beside(
 
 def test_other_files_become_mp4_as_well(run: Run, tmp_path: Path, stream: Path) -> None:
     run("decode", stream, "--fap", tmp_path / "a.fap")
-    assert run("convert", tmp_path / "a.fap", tmp_path / "a.mp4", "--fragment", 2).code == 0
+    run("convert", tmp_path / "a.fap", tmp_path / "a.mp4", "--fragment", 2)
     assert fba.read(tmp_path / "a.mp4").face == fba.read(tmp_path / "a.fap").face
-    assert run("convert", stream, tmp_path / "b.mp4", "--fps", 10).code == 0
+    run("convert", stream, tmp_path / "b.mp4", "--fps", 10)
     assert fba.read(tmp_path / "b.mp4").rate == 10
 
 
 def test_out_again_by_another_table_or_rate(run: Run, stream: Path, tmp_path: Path) -> None:
     film, back = tmp_path / "film.mp4", tmp_path / "back.fba"
     run("convert", stream, film)
-    assert run("convert", film, back, "--no-mark").code == 0
+    run("convert", film, back, "--no-mark")
     assert marked_table(back.read_bytes()) is None
-    assert run("convert", film, back, "--fps", 10).code == 0
+    run("convert", film, back, "--fps", 10)
     assert fba.read(back).rate == 10
     unmarked = tmp_path / "unmarked.fba"
     run("convert", stream, unmarked, "--no-mark", "--bap-steps", "visage")
-    assert run("convert", unmarked, film, "--bap-steps", "visage").code == 0
+    run("convert", unmarked, film, "--bap-steps", "visage")
     assert marked_table(read_mp4(film.read_bytes()).stream) == "visage"
 
 
@@ -205,10 +199,8 @@ def test_of_several_streams_one_is_named(run: Run, stream: Path, tmp_path: Path)
     film.write_bytes(whole_file(Track(planes), Track(planes[:9], number=3)))
     for command in (("info",), ("verify",), ("stats",), ("convert",)):
         more = [tmp_path / "out.fba"] if command == ("convert",) else []
-        failed = run(*command, film, *more)
-        assert failed.code == 1
-        assert "several FBA tracks: 1, 3; choose one with --track 1" in failed.err
-    assert run("convert", film, tmp_path / "out.fba", "--track", 3).code == 0
+        assert "several FBA tracks: 1, 3; choose one with --track 1" in run(*command, film, *more, code=1).err
+    run("convert", film, tmp_path / "out.fba", "--track", 3)
     assert len(fba.read(tmp_path / "out.fba")) == 9
     assert json.loads(run("verify", "--json", film, "--track", 3).out)["frames"] == 9
 
@@ -216,19 +208,14 @@ def test_of_several_streams_one_is_named(run: Run, stream: Path, tmp_path: Path)
 def test_a_cut_file_is_salvaged(run: Run, stream: Path, tmp_path: Path) -> None:
     film = tmp_path / "cut.mp4"
     film.write_bytes(write_mp4(stream.read_bytes())[:-2000])
-    failed = run("convert", film, tmp_path / "out.fba")
-    assert failed.code == 1
-    assert "it was cut off, or is damaged" in failed.err
-    saved = run("convert", film, tmp_path / "out.fba", "--salvage")
-    assert saved.code == 0
-    assert "samples before it are read" in saved.err
+    assert "it was cut off, or is damaged" in run("convert", film, tmp_path / "out.fba", code=1).err
+    assert "samples before it are read" in run("convert", film, tmp_path / "out.fba", "--salvage").err
     assert 0 < len(fba.read(tmp_path / "out.fba")) < len(fba.read(stream))
 
 
 def test_options_that_do_not_fit(run: Run, stream: Path, voice: Path, tmp_path: Path) -> None:
     for option in (("--fragment", 2), ("--audio", voice), ("--audio-codec", "opus"), ("--no-audio",)):
-        wrong = run("convert", stream, tmp_path / "a.fap", *option)
-        assert wrong.code == 2
+        wrong = run("convert", stream, tmp_path / "a.fap", *option, code=2)
         assert f"{option[0]} is for MP4 files, and OUT becomes FAP" in wrong.err
     for option, text in (
         (("--fragment", "0s"), "out of reach"),
@@ -237,9 +224,7 @@ def test_options_that_do_not_fit(run: Run, stream: Path, voice: Path, tmp_path: 
         (("--audio", voice, "--no-audio"), "contradict each other"),
         (("--mark",), "--mark is for streams"),
     ):
-        wrong = run("convert", stream, tmp_path / "a.mp4", *option)
-        assert wrong.code == 2
-        assert text in wrong.err
+        assert text in run("convert", stream, tmp_path / "a.mp4", *option, code=2).err
     assert not (tmp_path / "a.mp4").exists()
 
 
@@ -252,11 +237,7 @@ def test_a_film_is_no_stream(run: Run, voice: Path, tmp_path: Path) -> None:
         for _ in range(5):
             container.mux(pictures.encode(av.VideoFrame(32, 32, "yuv420p")))
         container.mux(pictures.encode(None))
-    failed = run("info", film)
-    assert failed.code == 1
+    failed = run("info", film, code=1)
     assert f"{film}: the MP4 file has no FBA track; its tracks: 1: video mp4v" in failed.err
     shutil.copy(voice, tmp_path / "voice.mp4")
-    assert (
-        "no format known here" in run("info", tmp_path / "voice.mp4").err
-        or run("info", tmp_path / "voice.mp4").code == 1
-    )
+    run("info", tmp_path / "voice.mp4", code=1)

@@ -1,18 +1,13 @@
 """`fba emotion`: what files with a face show."""
 
-from __future__ import annotations
-
 import csv
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import fba
-
-Run = Callable[..., Any]
+from command_line import Run
 
 
 @pytest.fixture
@@ -25,7 +20,6 @@ def angry(tmp_path: Path) -> Path:
 
 def test_a_summary_and_the_changes(run: Run, angry: Path) -> None:
     done = run("emotion", angry)
-    assert done.code == 0
     lines = done.out.splitlines()
     assert "50 frames; anger" in lines[0]
     assert [line.split()[1] for line in lines[2:-1]] == ["neutral", "anger", "neutral"]
@@ -41,7 +35,7 @@ def test_json_and_csv_say_the_same(run: Run, angry: Path, tmp_path: Path) -> Non
     assert middle["nearest"][0]["name"] == "rage"
     assert 60 <= middle["nearest"][0]["intensity"] <= 100
     assert 4 < middle["activation"] < 4.5
-    assert run("emotion", angry, "-o", tmp_path / "out.csv").code == 0
+    run("emotion", angry, "-o", tmp_path / "out.csv")
     rows = list(csv.DictReader((tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()))
     assert [row["label"] for row in rows] == [one["label"] for one in report["frames"]]
     assert rows[25]["nearest"].startswith("rage=")
@@ -57,11 +51,11 @@ def test_the_stream_of_an_expression_is_read_as_that_expression(run: Run, tmp_pa
 
 def test_a_file_without_a_face(run: Run, body: fba.Animation, tmp_path: Path) -> None:
     fba.write(tmp_path / "body.bap", body)
-    done = run("emotion", tmp_path / "body.bap")
-    assert (done.code, done.out) == (1, "")
+    done = run("emotion", tmp_path / "body.bap", code=1)
+    assert done.out == ""
     assert "has no face: it sends no FAPs" in done.err
 
 
 def test_options_that_contradict(run: Run, angry: Path) -> None:
-    assert run("emotion", angry, "-o", "-", "--json").code == 2
-    assert run("emotion", angry, "--baseline", "mean").code == 2
+    run("emotion", angry, "-o", "-", "--json", code=2)
+    run("emotion", angry, "--baseline", "mean", code=2)

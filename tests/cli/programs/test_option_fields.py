@@ -1,7 +1,5 @@
 """Options of commands from the fields of dataclasses and of the library's own option classes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal

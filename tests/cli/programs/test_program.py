@@ -1,7 +1,5 @@
 """Hints and usage lines begin with what the user typed to start the program."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

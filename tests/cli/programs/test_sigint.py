@@ -1,7 +1,5 @@
 """Ctrl-C at the worst moments."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

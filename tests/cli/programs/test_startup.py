@@ -1,7 +1,5 @@
 """What the program sets to start sooner does no harm, and stays within its own process."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,25 +1,20 @@
 """What is said while a command takes long: that it compiles, and how far it is."""
 
-from __future__ import annotations
-
 import io
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import fba
+from command_line import Run
 from fba import Animation
 from fba.cli.main import COMPILED_FUNCTIONS, CompileNotice
 from fba.cli.printing import Progress
 from fba.compiled import is_compiled
-
-Run = Callable[..., Any]
 
 
 class Terminal(io.StringIO):
@@ -91,7 +86,6 @@ def test_without_a_display_nothing_else_is_tried(
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     (tmp_path / "broken.fba").write_bytes(b"nothing")
-    refused = run("play", tmp_path / "broken.fba")
-    assert refused.code == 1
+    refused = run("play", tmp_path / "broken.fba", code=1)
     assert "DISPLAY" in refused.err
     assert "broken" not in refused.err

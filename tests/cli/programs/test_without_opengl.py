@@ -1,7 +1,5 @@
 """Where nothing can be drawn: what does not draw works, and what draws says in one line what is missing."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

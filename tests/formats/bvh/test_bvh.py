@@ -1,7 +1,5 @@
 """BVH as it is written, and as it is found."""
 
-from __future__ import annotations
-
 import time
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which frame rate a rounded frame time of a BVH file stands for."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest

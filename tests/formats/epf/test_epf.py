@@ -1,7 +1,5 @@
 """EPF files: what each tag means, contradictions, the 177 real ones both ways."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -52,20 +50,15 @@ def test_tags_stay_in_force_until_changed(tmp_path: Path) -> None:
     assert first.face is second.face is third.face
     assert fourth.frame_rate is fourth.time_code is None
     face = first.face
-    assert face is not None
     assert (face.quant, face.gender, face.coding_type) == (4, 0, 0)
     assert face.mask_types == (0, 3, 0, 0, 1, 0, 0, 0, 2, 0)
     # group 2 is FAP 3..18; group 5 FAP 39..42 with bits 1 0 0 0; group 9 FAP 61..64 with 1 0 0 0
     assert (np.flatnonzero(face.mask) + 1).tolist() == [*range(3, 19), 39, 61]
-    assert face.ranges.i_max is not None
     assert face.ranges.i_max.tolist() == [0, 0] + [2] * 66  # 61 -> 120
-    assert face.ranges.i_min is not None
     assert face.ranges.i_min.tolist() == [0, 0] + [2] * 66  # -61 -> -120
     assert face.ranges.p_max is face.ranges.p_min is None
-    assert fourth.face is not None
     assert (fourth.face.quant, fourth.face.gender) == (7, 1)
     assert fourth.face.mask.tolist() == face.mask.tolist()
-    assert fourth.face.ranges.p_min is not None
     assert fourth.face.ranges.p_min.tolist() == [0, 0] + [31] * 66
     assert fourth.face.ranges.i_max is None
 
@@ -80,7 +73,6 @@ def test_body_masks_follow_the_listed_order_of_the_groups(tmp_path: Path) -> Non
     (plane,) = read_epf(path)
     assert plane.body_frame == 5
     assert plane.face is None
-    assert plane.body is not None
     assert (np.flatnonzero(plane.body.mask) + 1).tolist() == [32, 42, *range(181, 187)]
 
 
@@ -195,7 +187,6 @@ def test_settings_without_a_tag(tmp_path: Path) -> None:
     with pytest.warns(FbaWarning, match="1 planes have a start code"):
         write_epf(tmp_path / "a.epf", [PlaneSettings(True, 0, face=part(gender=1), start_code=True)])
     (plane,) = read_epf(tmp_path / "a.epf")
-    assert plane.face is not None
     assert plane.face.gender == 1
 
 

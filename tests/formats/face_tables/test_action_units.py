@@ -1,7 +1,5 @@
 """Tables of OpenFace and py-feat, written from known intensities, poses and gazes: they come back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +61,6 @@ def test_signs_of_poses(
 def test_large_poses_are_turned_in_the_order_of_faces(tmp_path: Path) -> None:
     pose = np.array([0.5, -0.7, 0.4])
     motion = openface.read_face(saved(tmp_path, openface_csv(OF_FIVE, STILL + pose, AHEAD)))
-    assert motion.head is not None
     pitch, yaw, roll = motion.head[0]
     x, y, z = (rotations.axis_matrices(axis, angle) for axis, angle in enumerate((pitch, yaw, roll)))
     camera = np.diag([1.0, -1.0, -1.0])
@@ -79,7 +76,6 @@ def test_gaze_is_relative_to_the_head(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.eyes, np.tile([0, 0, -0.3, -0.3], (ROWS, 1)), atol=1e-6)
     aside = np.tile([0.2, 0.1, -1.0, 0.3, 0.0, -1.0], (ROWS, 1))  # eye 0 is the subject's right one
     motion = openface.read_face(saved(tmp_path, openface_csv(OF_FIVE, STILL, aside)))
-    assert motion.eyes is not None
     left_yaw, right_yaw, left_pitch, right_pitch = motion.eyes[0]
     assert left_yaw == pytest.approx(np.arctan(0.3), abs=1e-5)  # right in the picture is the subject's left
     assert right_yaw == pytest.approx(np.arctan(0.2), abs=1e-5)
@@ -175,7 +171,6 @@ def test_pyfeat(tmp_path: Path) -> None:
 def test_the_samples(shared: Path) -> None:
     motion = openface.read_face(shared / "data/capture/OpenFace_Test.csv")
     assert (len(motion), motion.units) == (100, UNITS)
-    assert motion.head is not None
     assert motion.eyes is not None
     assert 0.2 < motion.head[:, 0].mean() < 0.4
     old = pyfeat.read_face(shared / "data/capture/Feat_Test.csv")
@@ -187,7 +182,6 @@ def shown(units: dict[int, Float64 | float]) -> dict[str, int]:
     columns = np.array([[float(np.max(values)) for values in units.values()]])
     motion = ActionUnitMotion(tuple(units), columns, np.zeros(1), 25)  # type: ignore[arg-type]
     face = from_action_units(motion).face
-    assert face is not None
     return {name: int(face.values[0, number - 1]) for name, number in fap_numbers().items()}
 
 
@@ -202,7 +196,6 @@ def test_action_units_do_what_facs_says() -> None:
     closed = shown({45: 1.0})
     assert closed["close_t_l_eyelid"] + closed["close_b_l_eyelid"] == 1024
     jaw = shape_faps("jawOpen")
-    assert jaw is not None
     assert shown({26: 0.5})["open_jaw"] == round(0.25 * jaw[2])
     assert shown({43: 1.0, 45: 1.0}) == closed  # of units that do the same, none is added
     with pytest.raises(ModelError, match="no action unit is known here: 99"):

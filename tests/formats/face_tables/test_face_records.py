@@ -1,7 +1,5 @@
 """Datagrams, text records and JSON of captured faces, written from known weights: they come back."""
 
-from __future__ import annotations
-
 import json
 import struct
 from pathlib import Path
@@ -107,11 +105,7 @@ def test_two_senders(tmp_path: Path) -> None:
     ("data", "error", "said"),
     [
         (b"\x05" + datagram([0.0] * 61, 1.0)[1:], UnsupportedError, "byte 0: .* version 5; only version 6"),
-        (
-            struct.pack(">HH", 1, 4) + b"face" + bytes(60),
-            UnsupportedError,
-            "version 1 of the MetaHuman mode",
-        ),
+        (struct.pack(">HH", 1, 4) + b"face" + bytes(60), UnsupportedError, "version 1 of the MetaHuman mode"),
         (datagram([0.0] * 61, 1.0) + b"garbage", FormatError, "byte 312: no datagram of Live Link Face"),
         (datagram([0.0] * 61, 1.0)[:100], FormatError, "holds no complete datagram"),
         (
@@ -136,7 +130,6 @@ def test_the_recorded_capture(shared: Path) -> None:
     path = shared / "data/capture/livelink_capture.udp"
     motion = packets.read_face(path)
     assert (len(motion), int((~motion.seen).sum()), motion.rate) == (567, 7, 60)
-    assert motion.eyes is not None
     looks = {name: motion.weights[motion.seen][:, motion.names.index(name)] for name in motion.names}
     left = looks["eyeLookOutLeft"] - looks["eyeLookInLeft"]
     assert np.corrcoef(left, motion.eyes[motion.seen][:, 0])[0, 1] > 0.99
@@ -194,7 +187,6 @@ def test_signs_in_a_record_of_the_app(tmp_path: Path) -> None:
         "|hapihapi-0|=head#-16.5,4.35,0.26,0.03,-0.08,-0.4|rightEye#8.97,-4.78,-0.75|leftEye#8.8,-9.08,-1.4|"
     )
     motion = ifacialmocap.read_face(saved(tmp_path, "\n".join([record] * 2), "a.txt"), source_rate=60)
-    assert motion.eyes is not None
     yaw_left, yaw_right, pitch_left, pitch_right = motion.eyes[0]
     assert max(yaw_left, yaw_right) < 0 < min(pitch_left, pitch_right)
 

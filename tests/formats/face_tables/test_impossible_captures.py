@@ -1,7 +1,5 @@
 """Captures of faces with numbers or shapes that none can have, as mutated files had them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

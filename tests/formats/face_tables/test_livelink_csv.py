@@ -1,7 +1,5 @@
 """Tables of blendshapes, written from known weights in all the ways that are found: they come back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +10,7 @@ from fba.arrays import Float64
 from fba.errors import FbaWarning, FormatError, LimitError, OptionError
 from fba.formats.face_tables._livelink_csv import read_face
 from fba.parameters import fap_numbers
-from tools.captures.face_files import (
-    ANGLES,
-    STEP,
-    UDP_ORDER,
-    camel,
-    face_angles,
-    face_weights,
-    livelink_csv,
-)
+from tools.captures.face_files import ANGLES, STEP, UDP_ORDER, camel, face_angles, face_weights, livelink_csv
 
 ROWS = 90
 WEIGHTS = face_weights(ROWS)
@@ -39,9 +29,7 @@ def shape(path: Path, name: str, **options: str) -> Float64:
 
 
 def fap(path: Path, name: str) -> Float64:
-    face = fba.read(path).face
-    assert face is not None
-    return face.values[:, fap_numbers()[name] - 1].astype(float)
+    return fba.read(path).face.values[:, fap_numbers()[name] - 1].astype(float)
 
 
 def jaw_forward(weights: Float64) -> dict[str, Float64]:
@@ -86,7 +74,6 @@ def test_another_rate_keeps_the_times(tmp_path: Path) -> None:
     path = saved(tmp_path, livelink_csv(columns, step=1 / 60))
     slow = fba.read(path, rate=25)
     assert (slow.rate, slow.index[[0, -1]].tolist()) == (25, [0, 250])
-    assert slow.face is not None
     jaw = slow.face.values[:, fap_numbers()["thrust_jaw"] - 1]
     np.testing.assert_allclose(jaw, np.arange(251) / 250 * 400, atol=1)
 
@@ -126,7 +113,6 @@ def test_eyes_turn_by_shapes_where_no_angles_are_recorded(tmp_path: Path) -> Non
     path = saved(tmp_path, livelink_csv({**look, **still}))
     with pytest.warns(FbaWarning, match="all angles of head and eyes are 0"):
         face = fba.read(path).face
-    assert face is not None
     assert face.values[:, fap_numbers()["yaw_l_eyeball"] - 1].min() == 28750
     assert not face.mask[:, fap_numbers()["head_yaw"] - 1].any()
 

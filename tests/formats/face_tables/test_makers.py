@@ -1,7 +1,5 @@
 """Tables of faces in all the ways that makers vary them, from one known face: it comes back."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from collections.abc import Iterator
@@ -177,8 +175,6 @@ def test_angles_of_blendshape_tables(tmp_path: Path, degrees: bool) -> None:
     upper = {name[0].upper() + name[1:]: values for name, values in WEIGHTS.items()}
     motion = read_face(saved(tmp_path, livelink_csv({**upper, **turns})), swap="no")
     yaw = face_angles(ROWS)[ANGLES[0]]
-    assert motion.head is not None
-    assert motion.eyes is not None
     np.testing.assert_allclose(motion.head[:, 1], yaw, atol=1e-6)
     np.testing.assert_allclose(motion.eyes[:, 0], -face_angles(ROWS)["LeftEyeYaw"], atol=1e-6)
     assert any("taken as degrees" in finding for finding in motion.findings) == degrees
@@ -244,7 +240,6 @@ def test_the_samples_of_others(shared: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         face = fba.read(folder / "pyfeat_news003.csv").face
-    assert face is not None
     moved = face.values[:, [fap_numbers()[name] - 1 for name in ("head_pitch", "head_yaw", "head_roll")]]
     assert (np.ptp(moved, axis=0) > 2000).all()
     old = pyfeat.read_face(shared / "data/capture/Feat_Test.csv")

@@ -1,7 +1,5 @@
 """Files of tracked points: every layout gives the points, and what is none of a known tracker is refused."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace
@@ -150,7 +148,6 @@ def test_real_tracks(shared: Path) -> None:
     assert (len(found), found.count, found.share, found.flat) == (72, 478, True, False)
     with pytest.warns(FbaWarning, match="size: 16:9 makes"):
         smile = fba.read(shared / "data/capture/mediapipe_single_face.csv")
-    assert smile.face is not None
     assert smile.face.values[10, [52, 58]].max() < 50  # before the smile
     assert smile.face.values[50, [52, 53, 58, 59]].min() > 150
     with pytest.warns(FbaWarning, match="pictures"):
@@ -170,8 +167,6 @@ EXAMPLE = Path(__file__).parents[3] / "examples" / "track_a_film" / "track_a_fil
 @pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples come with a checkout")
 def test_the_table_of_the_example_that_tracks_films(tmp_path: Path) -> None:
     spec = spec_from_file_location("track_a_film", EXAMPLE)
-    assert spec is not None
-    assert spec.loader is not None
     tracking = module_from_spec(spec)
     spec.loader.exec_module(tracking)
     motion = deep()
@@ -204,7 +199,6 @@ def test_heads_of_py_feat_are_found_from_points(tmp_path: Path) -> None:
     lines = [f"{line},{more},approx_time" for line, more in zip(table[:1], [names], strict=True)]
     lines += [f"{line},{more},00:01" for line, more in zip(table[1:], rows, strict=True)]
     found = pyfeat.read_face(saved(tmp_path, "face.csv", "\n".join(lines)), source_rate=30)
-    assert found.head is not None
     np.testing.assert_allclose(found.head[:, 0], take.faps[:, 47] * 1e-5, atol=0.06)
     np.testing.assert_allclose(found.head[:, 1], take.faps[:, 48] * 1e-5, atol=0.06)
     np.testing.assert_allclose(found.head[:, 2], take.faps[:, 49] * 1e-5, atol=0.02)

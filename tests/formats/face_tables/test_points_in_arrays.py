@@ -1,7 +1,5 @@
 """Points in NumPy's arrays and in JSON: shapes and names that programs use, and what is none of them."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from io import BytesIO

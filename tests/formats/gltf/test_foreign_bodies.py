@@ -1,7 +1,5 @@
 """Skinned people of other makers as bodies for display, driven by BAPs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -79,9 +77,7 @@ def test_a_motion_moves_its_own_person_as_in_the_file(tmp_path: Path) -> None:
     }
     path = write_person(tmp_path / "p.glb", clips={"pose": clip})
     body = import_body(path)
-    track = fba.read(path, ground="none").body
-    assert track is not None
-    shown = BapSolver(body.skeleton).pose(track.values)
+    shown = BapSolver(body.skeleton).pose(fba.read(path, ground="none").body.values)
     size = HIPS / 0.86
     for frame in range(frames):
         world: dict[str, tuple[Rotation, np.ndarray]] = {}

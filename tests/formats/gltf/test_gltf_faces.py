@@ -1,7 +1,5 @@
 """FAPs read back from glTF: the same as were written, told by the motion that the file shows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -107,7 +105,6 @@ def test_it_is_the_motion_that_is_read(tmp_path: Path) -> None:
 
     edit_note(tmp_path / "a.glb", change)
     face = fba.read(tmp_path / "a.glb").face
-    assert face is not None
     assert face.values[:, 2].tolist() == [0, 60, 120, 180, 240, 300, 360, 420, 480]
     assert face.values[:, 30].tolist() == [320, 280, 240, 200, 160, 120, 80, 40, 0]
 
@@ -157,7 +154,6 @@ def test_visemes_become_what_they_show(tmp_path: Path) -> None:
     track = FaceTrack(np.zeros(mask.shape, dtype=np.int32), mask, viseme)
     fba.write(tmp_path / "a.glb", animation(track))
     back = fba.read(tmp_path / "a.glb").face
-    assert back is not None
     assert not back.mask[:, :2].any()
     shown = resolve(track)
     assert shown[-1].any()
@@ -173,7 +169,6 @@ def test_held_and_estimated_faps(tmp_path: Path) -> None:
     track = FaceTrack(values, mask)
     fba.write(tmp_path / "a.glb", animation(track))
     back = fba.read(tmp_path / "a.glb").face
-    assert back is not None
     assert back.values[:, 11].tolist() == [50] * 5 + [-70] * 4
     assert back.values[:, 12].tolist() == [50] * 5 + [-70] * 4
     assert not back.values[:, 2:11].any()
@@ -198,7 +193,6 @@ def test_targets_that_are_gone(tmp_path: Path) -> None:
     edit(tmp_path / "a.glb", change)
     with pytest.warns(FbaWarning, match=r"morph targets of FAPs are missing, and taken as 0: open_jaw"):
         face = fba.read(tmp_path / "a.glb").face
-    assert face is not None
     assert not face.values[:, 2].any()
     assert face.values[-1, 48] == 800
 

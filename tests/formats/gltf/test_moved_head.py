@@ -1,7 +1,5 @@
 """Heads that captured markers move, as glTF: shapes, weights and turns are those of the performance."""
 
-from __future__ import annotations
-
 import json
 import struct
 from fractions import Fraction

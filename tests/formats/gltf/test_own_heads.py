@@ -1,7 +1,5 @@
 """Heads of foreign bodies: FAPs mix their shapes, by name or as VRM declares them, and turn their eyes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +27,6 @@ def faps(**values: float) -> np.ndarray:
 def risen(path: Path, values: np.ndarray) -> np.ndarray:
     """By how much FAPs raise vertices, in metres of the file."""
     body = import_body(path)
-    assert body.own_head is not None
     size = float(body.notes["size"].split()[0])
     moved: np.ndarray = body.own_head.move(body.vertices, values) - body.vertices
     return moved / size
@@ -39,7 +36,6 @@ def test_shapes_with_known_names_move_the_head(tmp_path: Path) -> None:
     morphs = {"jawOpen": [0.0], "eyeBlink_L": [0.0], "Wobble": [0.0]}
     path = write_person(tmp_path / "p.glb", morphs=morphs)
     body = import_body(path)
-    assert body.own_head is not None
     assert [shape.name for shape in body.own_head.shapes] == ["jawOpen", "eyeBlinkLeft"]
     moved = risen(path, faps(close_t_l_eyelid=1024))
     np.testing.assert_allclose(moved[HEAD], np.tile([0, RISE, 0], (8, 1)), atol=2e-5)
@@ -89,7 +85,6 @@ def test_eyes_turn_with_their_bones(tmp_path: Path) -> None:
 
     edit(path, rename)
     body = import_body(path)
-    assert body.own_head is not None
     (eye,) = body.own_head.eyes
     box = 8 * list(BONES).index("leftMiddleProximal")
     assert eye.rows.tolist() == list(range(box, box + 8))

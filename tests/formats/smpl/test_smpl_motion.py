@@ -1,7 +1,5 @@
 """Motion of SMPL's bodies: layouts of poses, axes, jaw and eyes, rates, and files that are none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +35,6 @@ def saved(folder: Path, name: str = "a.npz", **arrays: Any) -> Path:
 
 
 def value(animation: fba.Animation, name: str) -> np.ndarray:
-    assert animation.body is not None
     return animation.body.values[:, bap_numbers()[name] - 1]
 
 
@@ -83,7 +80,6 @@ def test_jaw_and_eyes(tmp_path: Path) -> None:
         tmp_path, root_orient=parts[0], pose_body=parts[1], pose_jaw=jaw, pose_eye=eyes.reshape(FRAMES, 6)
     )
     face = fba.read(path).face
-    assert face is not None
     opened = face.values[:, fap_numbers()["open_jaw"] - 1]
     np.testing.assert_allclose(opened, RAMP * opened[-1], atol=1)
     assert opened[-1] > 800

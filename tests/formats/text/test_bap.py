@@ -1,7 +1,5 @@
 """BAP files: both widths, scales, round trips, the real ones."""
 
-from __future__ import annotations
-
 import tempfile
 import warnings
 from pathlib import Path
@@ -27,7 +25,6 @@ def test_a_face_is_not_written_as_a_body(tmp_path: Path) -> None:
 def test_both_widths_and_one_column_more(tmp_path: Path, width: int) -> None:
     path = file(tmp_path, "a.bap", "3.2 walk 30 1", mask(1, 186, width=width), "3 -5 6")
     animation = read_bap(path)
-    assert animation.body is not None
     assert animation.index.tolist() == [3]
     assert animation.body.values[0, [0, 185]].tolist() == [-5, 6]
     assert animation.body.mask.sum() == 2
@@ -38,15 +35,12 @@ def test_both_widths_and_one_column_more(tmp_path: Path, width: int) -> None:
 def test_a_file_may_change_its_width(tmp_path: Path) -> None:
     path = file(tmp_path, "a.bap", "3.1 a 30 2", mask(186, width=186), "0 1", mask(296, width=296), "1 2")
     body = read_bap(path).body
-    assert body is not None
     assert (body.values[0, 185], body.values[1, 295]) == (1, 2)
 
 
 def test_angle_scale_leaves_millimetres_alone(tmp_path: Path) -> None:
     path = file(tmp_path, "a.bap", "3.1 a 30 1", mask(1, 181, 184, width=186), "0 3 1000 -3")
-    body = read_bap(path, angle_scale=1.5).body
-    assert body is not None
-    assert body.values[0, [0, 180, 183]].tolist() == [5, 1000, -5]
+    assert read_bap(path, angle_scale=1.5).body.values[0, [0, 180, 183]].tolist() == [5, 1000, -5]
     with pytest.raises(FormatError, match=r"must lie in .* after angle_scale 1e\+10"):
         read_bap(path, angle_scale=1e10)
     for scale in (0, float("nan"), "x"):
@@ -85,7 +79,6 @@ def test_every_real_file_reads_and_writes_back(shared: Path, tmp_path: Path) -> 
 
 def test_known_numbers_of_a_real_file(shared: Path) -> None:
     body = read_bap(shared / "data" / "vreng" / "clap.bap").body
-    assert body is not None
     assert len(body) == 59
     assert body.values[0][body.mask[0]].tolist() == [-8726, -8726, 8726, 8726]
     assert body.values[58][body.mask[58]].tolist() == [49109, -36678, 164853, -131197, 23565, 28441]

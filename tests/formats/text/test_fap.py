@@ -1,7 +1,5 @@
 """FAP files: the real ones, the odd ones, the broken ones, and round trips."""
 
-from __future__ import annotations
-
 import tempfile
 import warnings
 from fractions import Fraction
@@ -28,7 +26,6 @@ def test_reads_values_masks_and_numbers(tmp_path: Path) -> None:
     assert animation.rate == 25
     assert animation.index.tolist() == [4, 5, 9]
     face = animation.face
-    assert face is not None
     assert face.viseme.tolist() == [[1, 2, 63, 1], [0] * 4, [0] * 4]
     assert face.expression[0].tolist() == [5, 62, 6, 61, 0, 1]
     assert face.values[0, [2, 3, 67]].tolist() == [-7, 0, 99]
@@ -41,7 +38,6 @@ def test_line_ends_byte_order_mark_and_old_encodings(tmp_path: Path, end: bytes)
     path = file(tmp_path, "a.fap", b"\xef\xbb\xbf2.0 " + name + b" 30 1", mask(5), "0 12", end=end)
     animation = read_fap(path)
     assert animation.name == "Gähnen"
-    assert animation.face is not None
     assert animation.face.values[0, 4] == 12
 
 
@@ -51,7 +47,6 @@ def test_windows_path_as_a_name_and_a_69th_column(tmp_path: Path) -> None:
     )
     animation = read_fap(path)
     assert animation.name == r"C:\My Files\x"
-    assert animation.face is not None
     assert animation.face.values[:, 18].tolist() == [940, 0]
     assert not animation.face.mask[1].any()
 
@@ -63,15 +58,12 @@ def test_floats_round_half_away_from_zero_with_one_warning(tmp_path: Path) -> No
     with pytest.warns(FbaWarning, match=r"a\.fap: 4 values are not integers, the first on line 3") as caught:
         animation = read_fap(path)
     assert len(caught) == 1
-    assert animation.face is not None
     assert animation.face.values[0, 2:7].tolist() == [1, -1, 1, 200, 0]
 
 
 def test_angle_scale_touches_angles_only(tmp_path: Path) -> None:
     path = file(tmp_path, "a.fap", "2.0 a 25 1", mask(3, 48), "0 10 10")
-    face = read_fap(path, angle_scale=50).face
-    assert face is not None
-    assert face.values[0, [2, 47]].tolist() == [10, 500]
+    assert read_fap(path, angle_scale=50).face.values[0, [2, 47]].tolist() == [10, 500]
 
 
 def test_the_frame_count_of_the_header_is_a_hint(tmp_path: Path) -> None:

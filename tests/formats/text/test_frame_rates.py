@@ -1,7 +1,5 @@
 """Frame rates as text."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest

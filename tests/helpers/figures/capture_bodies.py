@@ -1,7 +1,5 @@
 """Small captured bodies for the tests of motion capture, and an independent check of bone directions."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import pairwise
 

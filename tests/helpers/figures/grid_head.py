@@ -3,8 +3,6 @@
 About 3,000 vertices, symmetric, all 84 feature points of `adult.csv` on vertices of their own.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.sparse import csr_array, diags_array

@@ -1,7 +1,5 @@
 """Face tracks written out by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fba.animation import FaceTrack

@@ -1,7 +1,5 @@
 """People who lie, crawl, swim, fly, hang, fall, sit and stand, as skeletons of any axis up."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 

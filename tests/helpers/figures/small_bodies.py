@@ -1,7 +1,5 @@
 """Small bodies with known answers, for the tests of models and skinning."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """A face of a few hundred vertices, quick to make and to draw: an egg with two balls in it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fba.face._tables import FaceDefMesh, FaceDefTables

@@ -1,7 +1,5 @@
 """A small head for tests: a mask through the feature points of `adult.csv`, eyeballs, teeth, a tongue."""
 
-from __future__ import annotations
-
 import csv
 from functools import cache
 from pathlib import Path

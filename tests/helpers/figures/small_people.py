@@ -1,7 +1,5 @@
 """Small people as glTF: a T pose of 22 bones, boxes for limbs, clips, morph targets, and VRM's extensions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

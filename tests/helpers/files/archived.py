@@ -1,7 +1,5 @@
 """A folder of performances of two subjects, and an archive of them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

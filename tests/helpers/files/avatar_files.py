@@ -1,7 +1,5 @@
 """Avatar animation units and their containers as other programs write them, put together by hand."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zipfile

@@ -1,8 +1,6 @@
 """Streams and animations that the codec's tests share: written bit by bit from the syntax tables, or drawn
 by hypothesis."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Small files and animations that the format tests share."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Change the JSON of a .glb, for tests of what its reader says."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable

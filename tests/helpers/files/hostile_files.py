@@ -4,8 +4,6 @@
 that a reader might search again and again, or unpack: tokens, names, nodes, brackets, quotes, skipped frames.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 import zipfile
@@ -18,9 +16,29 @@ from typing import Any
 
 import numpy as np
 
+import fba
+from fba.audio import SoundFile
+from fba.body import BodyDefinition, BodyModel
+from fba.capture.bones import match
+from fba.capture.markers._motion import MarkerMotion
+from fba.codec import encode_planes
+from fba.face import FaceModel
+from fba.face.importers._gltf import gltf_pieces
+from fba.face.importers._mesh import polygon_pieces, read_materials
+from fba.face.importers.points.points_file import read_points
+from fba.formats import format_of
+from fba.formats.epf.epf import read_epf
+from fba.mesh._obj import read_obj
+from fba.mesh._ply import read_ply
+from fba.mesh._vrml import read_vrml
+from fba.mesh._wfm import read_wfm
+from fba.persona import Persona
+from fba_player._mesh.textures import load_picture
 from format_files import mask
 from gltf_documents import Sheet
 from mp4_files import Track, box, fragmented_file, numbers, whole_file
+from tools.captures.face_files import datagram, face_weights, livelink_csv
+from tools.captures.marker_files import c3d, qualisys, trc
 
 JOINTS = {
     "Spine": ("Hips", (0, 1, 0)),
@@ -255,132 +273,34 @@ def even_vertices(size: int) -> bytes:
     return head.encode() + bytes(36) + lists
 
 
-def read_any(path: Path) -> object:
-    """Read an animation."""
-    import fba
-
-    return fba.read(path)
-
-
 def read_motion(path: Path) -> object:
     """Read a capture, and find its joints by their names."""
-    from fba.capture.bones import match
-    from fba.formats import format_of
-
-    read = format_of(path).read_motion
-    assert read is not None
-    motion = read(path)
-    return match(motion.names)
+    return match(format_of(path).read_motion(path).names)
 
 
 def encode_capture(path: Path) -> object:
     """Encode a capture."""
-    import fba
-
     return fba.encode(fba.read(path), fba.EncoderOptions(clamp=True))
-
-
-def read_epf(path: Path) -> object:
-    """Read an EPF file."""
-    from fba.formats.epf.epf import read_epf as read
-
-    return read(path)
 
 
 def encode_with_epf(path: Path) -> object:
     """Encode an animation as an EPF file says."""
-    import fba
-    from fba.codec import encode_planes
-    from fba.formats.epf.epf import read_epf as read
-
-    return encode_planes(fba.read(path.with_suffix(".fap")), read(path))
-
-
-def read_obj(path: Path) -> object:
-    """Read an OBJ mesh."""
-    from fba.mesh._obj import read_obj as read
-
-    return read(path)
+    return encode_planes(fba.read(path.with_suffix(".fap")), read_epf(path))
 
 
 def read_pieces(path: Path) -> object:
     """Read an OBJ mesh with its materials, as an import does."""
-    from fba.face.importers._mesh import polygon_pieces, read_materials
-    from fba.mesh._obj import read_obj as read
-
-    return polygon_pieces(read(path), read_materials(path))
-
-
-def read_ply(path: Path) -> object:
-    """Read a PLY mesh."""
-    from fba.mesh._ply import read_ply as read
-
-    return read(path)
-
-
-def read_vrml(path: Path) -> object:
-    """Read a VRML mesh."""
-    from fba.mesh._vrml import read_vrml as read
-
-    return read(path)
-
-
-def read_wfm(path: Path) -> object:
-    """Read a wire frame."""
-    from fba.mesh._wfm import read_wfm as read
-
-    return read(path)
-
-
-def read_points(path: Path) -> object:
-    """Read feature points."""
-    from fba.face.importers.points.points_file import read_points as read
-
-    return read(path)
-
-
-def read_head(path: Path) -> object:
-    """Read the pieces of a glTF head."""
-    from fba.face.importers._gltf import gltf_pieces
-
-    return gltf_pieces(path)
+    return polygon_pieces(read_obj(path), read_materials(path))
 
 
 def read_picture(path: Path) -> object:
     """Decode the picture of a glTF head."""
-    from fba.face.importers._gltf import gltf_pieces
-    from fba_player._mesh.textures import load_picture
-
     (piece,), _ = gltf_pieces(path)
-    assert piece.part.material.texture is not None
     return load_picture(piece.part.material.texture).reduced(4)
-
-
-def load_face(path: Path) -> object:
-    """Load a face model."""
-    from fba.face import FaceModel
-
-    return FaceModel.load(path)
-
-
-def load_body(path: Path) -> object:
-    """Load a body model."""
-    from fba.body import BodyModel
-
-    return BodyModel.load(path)
-
-
-def load_definition(path: Path) -> object:
-    """Load a body definition."""
-    from fba.body import BodyDefinition
-
-    return BodyDefinition.load(path)
 
 
 def read_sound(path: Path) -> object:
     """Read a sound, a second at a time."""
-    from fba.audio import SoundFile
-
     with SoundFile(path) as sound:
         at = 0
         while len(part := sound.read(at, sound.rate)):
@@ -431,15 +351,15 @@ def hostile_files() -> dict[str, HostileFile]:
 
 def _texts() -> dict[str, HostileFile]:
     return {
-        "fap words": HostileFile(read_any, "a.fap", repeat(FAP_HEAD + mask(3) + "\n0 ", "1 ")),
-        "fap masks": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, mask(3) + "\n%d 1\n")),
-        "fap blanks": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, "\n")),
-        "fap comments": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, "#\n")),
-        "fap returns": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, "\r")),
-        "fap backwards": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, mask() + "\n0\n")),
-        "fap name": HostileFile(read_any, "a.fap", repeat("2.1 ", "a ", "25 1\n", most=30_000)),
-        "fap empty masks": HostileFile(read_any, "a.fap", repeat(FAP_HEAD, mask() + "\n%d\n")),
-        "bap masks": HostileFile(read_any, "a.bap", repeat("3.1 a 25 1\n", mask(width=186) + "\n%d\n")),
+        "fap words": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD + mask(3) + "\n0 ", "1 ")),
+        "fap masks": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, mask(3) + "\n%d 1\n")),
+        "fap blanks": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, "\n")),
+        "fap comments": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, "#\n")),
+        "fap returns": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, "\r")),
+        "fap backwards": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, mask() + "\n0\n")),
+        "fap name": HostileFile(fba.read, "a.fap", repeat("2.1 ", "a ", "25 1\n", most=30_000)),
+        "fap empty masks": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, mask() + "\n%d\n")),
+        "bap masks": HostileFile(fba.read, "a.bap", repeat("3.1 a 25 1\n", mask(width=186) + "\n%d\n")),
         "epf planes": HostileFile(read_epf, "a.epf", repeat(EPF_PLANE, "FBM 1\nFFR 1\n")),
         "epf I planes": HostileFile(read_epf, "a.epf", repeat("", EPF_PLANE)),
         "epf words": HostileFile(read_epf, "a.epf", repeat("FBM 1\nFIX ", "1 ")),
@@ -458,7 +378,7 @@ def _captures() -> dict[str, HostileFile]:
         "bvh capture": HostileFile(encode_capture, "a.bvh", capture),
         "bvh spaces": HostileFile(read_motion, "a.bvh", repeat(bvh() + "Frames", " ", "x\n")),
         "bvh short lines": HostileFile(read_motion, "a.bvh", repeat(bvh(channels=1) + FRAMES, "11\n")),
-        "bvh frames": HostileFile(read_any, "a.bvh", repeat(bvh(channels=1) + FRAMES, "1\n", most=10_000)),
+        "bvh frames": HostileFile(fba.read, "a.bvh", repeat(bvh(channels=1) + FRAMES, "1\n", most=10_000)),
         "bvh one line": HostileFile(read_motion, "a.bvh", repeat(bvh() + FRAMES, "1 ")),
         "bvh blank lines": HostileFile(read_motion, "a.bvh", repeat(bvh() + motion, "\n")),
         "bvh braces": HostileFile(read_motion, "a.bvh", repeat(start, "{")),
@@ -481,7 +401,7 @@ def _captures() -> dict[str, HostileFile]:
         "gltf channels": HostileFile(read_motion, "a.glb", lambda size: skeleton(channels=size // 64)),
         "gltf clips": HostileFile(read_motion, "a.glb", lambda size: skeleton(clips=size // 120)),
         "gltf roots": HostileFile(read_motion, "a.glb", lambda size: skeleton(roots=size // 24)),
-        "gltf hours": HostileFile(read_any, "a.glb", lambda size: skeleton(last=16_000.0)),
+        "gltf hours": HostileFile(fba.read, "a.glb", lambda size: skeleton(last=16_000.0)),
     }
 
 
@@ -490,8 +410,6 @@ NAMES = '[{"t":-1,"jawOpen":0,"mouthClose":0,"eyeBlinkLeft":0,"eyeBlinkRight":0,
 
 
 def _faces() -> dict[str, HostileFile]:
-    from tools.captures.face_files import datagram, face_weights, livelink_csv
-
     def frames(size: int) -> bytes:
         return b"".join(datagram([0.2] * 61, 2 + number / 60) for number in range(size // 320))
 
@@ -504,7 +422,7 @@ def _faces() -> dict[str, HostileFile]:
             encode_capture, "a.udp", lambda size: datagram([0.1] * 61, 1.0) + frames(size)
         ),
         "packets without a face": HostileFile(
-            read_any,
+            fba.read,
             "a.udp",
             lambda size: (
                 datagram([0.1] * 61, 0.0)
@@ -512,38 +430,31 @@ def _faces() -> dict[str, HostileFile]:
             ),
         ),
         "records of a face": HostileFile(encode_capture, "a.txt", repeat("", RECORD + "\n")),
-        "records, bars": HostileFile(read_any, "a.txt", repeat(RECORD, "|")),
-        "records, names": HostileFile(read_any, "a.txt", repeat(RECORD, "a%d-1|")),
-        "records, small": HostileFile(read_any, "a.txt", repeat(RECORD, "jawOpen-1\n")),
-        "scores, nested": HostileFile(read_any, "a.json", repeat(NAMES, "[", "]")),
-        "scores, lists": HostileFile(read_any, "a.json", repeat(NAMES, "[],", "0]")),
+        "records, bars": HostileFile(fba.read, "a.txt", repeat(RECORD, "|")),
+        "records, names": HostileFile(fba.read, "a.txt", repeat(RECORD, "a%d-1|")),
+        "records, small": HostileFile(fba.read, "a.txt", repeat(RECORD, "jawOpen-1\n")),
+        "scores, nested": HostileFile(fba.read, "a.json", repeat(NAMES, "[", "]")),
+        "scores, lists": HostileFile(fba.read, "a.json", repeat(NAMES, "[],", "0]")),
         "scores, frames": HostileFile(
             encode_capture, "a.json", repeat(NAMES + "0", ',{"t":%d,"jawOpen":0}', "]")
         ),
         "table of a face": HostileFile(encode_capture, "a.csv", rows),
-        "table, short rows": HostileFile(read_any, "a.csv", repeat(few + "\n", "0:0:0:%d" + ",0" * 7 + "\n")),
-        "table, names": HostileFile(read_any, "a.csv", repeat(few, ",a", "\n" + table)),
-        "table, blank lines": HostileFile(read_any, "a.csv", repeat(table, "\n")),
-        "table, one line": HostileFile(read_any, "a.csv", repeat(table, "1,")),
+        "table, short rows": HostileFile(fba.read, "a.csv", repeat(few + "\n", "0:0:0:%d" + ",0" * 7 + "\n")),
+        "table, names": HostileFile(fba.read, "a.csv", repeat(few, ",a", "\n" + table)),
+        "table, blank lines": HostileFile(fba.read, "a.csv", repeat(table, "\n")),
+        "table, one line": HostileFile(fba.read, "a.csv", repeat(table, "1,")),
         "table, empty cells": HostileFile(
-            read_any, "a.csv", repeat(head + "\n", "0:0:0:1" + "," * 53 + "\n")
+            fba.read, "a.csv", repeat(head + "\n", "0:0:0:1" + "," * 53 + "\n")
         ),
     }
 
 
 def read_markers(path: Path) -> object:
     """Read a capture of markers."""
-    from fba.formats import format_of
-
-    reader = format_of(path).read_face
-    assert reader is not None
-    return reader(path, source_rate=Fraction(50))
+    return format_of(path).read_face(path, source_rate=Fraction(50))
 
 
 def _markers() -> dict[str, HostileFile]:
-    from fba.capture.markers._motion import MarkerMotion
-    from tools.captures.marker_files import c3d, qualisys, trc
-
     def take(markers: int, frames: int) -> MarkerMotion:
         positions = np.full((frames, markers, 3), 0.5)
         return MarkerMotion(
@@ -585,23 +496,25 @@ def _markers() -> dict[str, HostileFile]:
 
 def _gltf() -> dict[str, HostileFile]:
     return {
-        "gltf surfaces": HostileFile(read_head, "a.glb", lambda size: surface(meshes=size // 12)),
-        "gltf heads": HostileFile(read_head, "a.glb", lambda size: surface(meshes=size // 22, name="head")),
-        "gltf targets": HostileFile(read_head, "a.glb", lambda size: surface(targets=min(size // 16, 4096))),
-        "gltf lists": HostileFile(read_head, "a.gltf", repeat(GLTF + '"extras": [', "[],", "0]}")),
-        "gltf objects": HostileFile(read_head, "a.gltf", repeat(GLTF + '"extras": [', "{},", "0]}")),
-        "gltf meshes": HostileFile(
-            read_head, "a.gltf", repeat(GLTF + '"meshes": [', '{"primitives":[]},', '{"primitives":[]}]}')
+        "gltf surfaces": HostileFile(gltf_pieces, "a.glb", lambda size: surface(meshes=size // 12)),
+        "gltf heads": HostileFile(gltf_pieces, "a.glb", lambda size: surface(meshes=size // 22, name="head")),
+        "gltf targets": HostileFile(
+            gltf_pieces, "a.glb", lambda size: surface(targets=min(size // 16, 4_096))
         ),
-        "gltf materials": HostileFile(read_head, "a.gltf", repeat(GLTF + '"materials": [', "{},", "{}]}")),
-        "gltf deep": HostileFile(read_head, "a.gltf", pairs(GLTF + '"extras": ', "[", "", "]", "}")),
-        "gltf members": HostileFile(read_head, "a.gltf", repeat(GLTF, '"a%d":0,', '"b":0}')),
-        "gltf digits": HostileFile(read_head, "a.gltf", repeat(GLTF + '"scene": ', "1", "}")),
+        "gltf lists": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF + '"extras": [', "[],", "0]}")),
+        "gltf objects": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF + '"extras": [', "{},", "0]}")),
+        "gltf meshes": HostileFile(
+            gltf_pieces, "a.gltf", repeat(GLTF + '"meshes": [', '{"primitives":[]},', '{"primitives":[]}]}')
+        ),
+        "gltf materials": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF + '"materials": [', "{},", "{}]}")),
+        "gltf deep": HostileFile(gltf_pieces, "a.gltf", pairs(GLTF + '"extras": ', "[", "", "]", "}")),
+        "gltf members": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF, '"a%d":0,', '"b":0}')),
+        "gltf digits": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF + '"scene": ', "1", "}")),
         "gltf picture": HostileFile(
             read_picture, "a.glb", lambda size: surface(picture=deflated_picture(size // 5))
         ),
-        "face of nothing": HostileFile(load_face, "a.glb", lambda size: surface(meshes=size // 12)),
-        "body of nothing": HostileFile(load_body, "a.glb", lambda size: skeleton(nodes=size // 44)),
+        "face of nothing": HostileFile(FaceModel.load, "a.glb", lambda size: surface(meshes=size // 12)),
+        "body of nothing": HostileFile(BodyModel.load, "a.glb", lambda size: skeleton(nodes=size // 44)),
     }
 
 
@@ -685,14 +598,14 @@ def _points() -> dict[str, HostileFile]:
         ),
         "xface attributes": HostileFile(read_points, "a.fdp", repeat("<xfdp ", 'a%d="" ', "/>")),
         "body joints": HostileFile(
-            load_definition, "a.json", repeat('{"joints": {', '"j%d": {"centre": [0, 0, 0]},', '"j": 0}}')
+            BodyDefinition.load, "a.json", repeat('{"joints": {', '"j%d": {"centre": [0, 0, 0]},', '"j": 0}}')
         ),
-        "body lists": HostileFile(load_definition, "a.json", repeat('{"joints": [', "[],", "0]}")),
+        "body lists": HostileFile(BodyDefinition.load, "a.json", repeat('{"joints": [', "[],", "0]}")),
         "body digits": HostileFile(
-            load_definition, "a.json", repeat('{"joints": {"a": {"centre": [', "1", ",0,0]}}}")
+            BodyDefinition.load, "a.json", repeat('{"joints": {"a": {"centre": [', "1", ",0,0]}}}")
         ),
         "body name": HostileFile(
-            load_definition, "a.json", repeat('{"joints": {"', "a", '": {"centre": 0}}}')
+            BodyDefinition.load, "a.json", repeat('{"joints": {"', "a", '": {"centre": 0}}}')
         ),
     }
 
@@ -701,19 +614,19 @@ def _films() -> dict[str, HostileFile]:
     plane = b"\0\0\1\xbb\xff"
     return {
         "mp4 samples": HostileFile(
-            read_any, "a.mp4", lambda size: whole_file(Track([plane] * (size // 30), chunks=(1,)))
+            fba.read, "a.mp4", lambda size: whole_file(Track([plane] * (size // 30), chunks=(1,)))
         ),
-        "mp4 equal samples": HostileFile(read_any, "a.mp4", equal_samples),
+        "mp4 equal samples": HostileFile(fba.read, "a.mp4", equal_samples),
         "mp4 fragments": HostileFile(
-            read_any,
+            fba.read,
             "a.mp4",
             lambda size: fragmented_file(Track([plane] * (size // 120)), range(1, size // 120)),
         ),
         "mp4 boxes": HostileFile(
-            read_any, "a.mp4", lambda size: whole_file(Track([plane]), padding=box(b"free") * (size // 8))
+            fba.read, "a.mp4", lambda size: whole_file(Track([plane]), padding=box(b"free") * (size // 8))
         ),
         "mp4 tracks": HostileFile(
-            read_any,
+            fba.read,
             "a.mp4",
             lambda size: whole_file(*(Track([plane], number=n) for n in range(size // 560))),
         ),
@@ -739,8 +652,6 @@ def _sounds() -> dict[str, HostileFile]:
 
 
 def _personas() -> dict[str, HostileFile]:
-    from fba.persona import Persona
-
     return {"persona members": HostileFile(Persona.load, "a.persona", persona_members)}
 
 

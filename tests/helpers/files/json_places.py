@@ -1,7 +1,5 @@
 """A JSON document with one value replaced, for tests of what readers say."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

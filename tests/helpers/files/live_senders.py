@@ -1,7 +1,5 @@
 """Captures sent live: datagrams with the times at which they come, and what a `Capture` makes of them."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Iterable, Sequence

@@ -3,8 +3,6 @@
 `python measured_reading.py FOLDER SMALL LARGE`: sizes in bytes. It needs /proc, as Linux has.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import os

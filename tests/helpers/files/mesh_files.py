@@ -1,7 +1,5 @@
 """Mesh files of other programs, written for tests: OBJ, PLY and glTF."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """MP4 files as other programs write them, with all forms of the boxes of ISO/IEC 14496-12."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field

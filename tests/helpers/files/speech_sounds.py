@@ -1,7 +1,5 @@
 """Sounds like speech, for which no program must be installed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fba.arrays import Int16

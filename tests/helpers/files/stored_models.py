@@ -1,7 +1,5 @@
 """Small face models for the tests of their storage, by hand and by hypothesis."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from functools import cache

@@ -28,14 +28,7 @@ from fba.errors import FormatError
 from fba.formats.numpy_archives import read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.persona.points import fit_face_points
-from fba.persona.points.layout import (
-    OUTLINE,
-    REGISTERED,
-    SAME,
-    TRACKED,
-    compute_vertices,
-    standard_points,
-)
+from fba.persona.points.layout import OUTLINE, REGISTERED, SAME, TRACKED, compute_vertices, standard_points
 from fba.source import read_whole
 from tools.persona.training.classes import NEUTRAL, face_classes
 from tools.persona.training.depth_maps import DepthMap, fill_holes, find_outline, make_depth_map

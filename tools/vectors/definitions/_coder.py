@@ -63,14 +63,10 @@ def coder_cases() -> Iterator[Case]:
     ):
         yield Case(f"zeros_at_end_{zeros}", text, partial(_open_end, zeros))
     yield Case(
-        "counts_learnt",
-        "differences that repeat, so that they cost less and less, then a rare one",
-        _learnt,
+        "counts_learnt", "differences that repeat, so that they cost less and less, then a rare one", _learnt
     )
     yield Case(
-        "counts_reset",
-        "an I plane sets the counts of P planes back, and those of its own half only",
-        _reset,
+        "counts_reset", "an I plane sets the counts of P planes back, and those of its own half only", _reset
     )
     yield Case("alphabets_largest", "3721 symbols for each of 66 FAPs", _largest)
     yield Case(

@@ -17,6 +17,7 @@ from tools.vectors.definitions._targets import (
     faces,
     only,
     script,
+    scripted,
 )
 from tools.vectors.definitions.case import Case
 from tools.vectors.stream_writer import Header, Plane, Values, write_stream
@@ -25,22 +26,14 @@ from tools.vectors.stream_writer import Header, Plane, Values, write_stream
 def mask_cases() -> Iterator[Case]:
     """Yield streams of all mask types and masks."""
     yield Case(
-        "mask_type_1",
-        "some FAPs of every group, the others keep their values",
-        lambda: write_stream(script(faces(8, FEW_FAPS))),
+        "mask_type_1", "some FAPs of every group, the others keep their values", scripted(faces(8, FEW_FAPS))
     )
     yield Case(
         "mask_type_2",
         "some FAPs of every group, the others are to be interpolated",
-        lambda: write_stream(
-            script(faces(8, FEW_FAPS), fap=Header(mask_types=dict.fromkeys(range(2, FAP_GROUP_COUNT + 1), 2)))
-        ),
+        scripted(faces(8, FEW_FAPS), fap=Header(mask_types=dict.fromkeys(range(2, FAP_GROUP_COUNT + 1), 2))),
     )
-    yield Case(
-        "fap_mask_types",
-        "every FAP group with every mask type, one after the other",
-        _fap_mask_types,
-    )
+    yield Case("fap_mask_types", "every FAP group with every mask type, one after the other", _fap_mask_types)
     yield Case("bap_mask_types", "every BAP group with mask types 0, 1 and 3", _bap_mask_types)
     yield Case(
         "masks_full",
@@ -73,24 +66,20 @@ def mask_cases() -> Iterator[Case]:
     yield Case(
         "mask_body",
         "some BAPs of many groups: coded in the order of groups, not of numbers",
-        lambda: write_stream(script(None, bodies(10, FEW_BAPS))),
+        scripted(None, bodies(10, FEW_BAPS)),
     )
     yield Case(
         "high_level_only",
         "viseme and expression without a low-level FAP: the last segment is empty",
-        lambda: write_stream(script(only(faces(12, (), viseme=True, expression=True), (1, 2)))),
+        scripted(only(faces(12, (), viseme=True, expression=True), (1, 2))),
     )
     yield Case(
         "mask_nothing",
         "mask type 0 in every group, FAPs and BAPs: planes of a header and two empty segments",
-        lambda: write_stream(script([{}] * 6, [{}] * 6, intra=(0, 3))),
+        scripted([{}] * 6, [{}] * 6, intra=(0, 3)),
     )
     yield Case("masks_change", "masks that change in I planes; P planes go by the last one", _masks_change)
-    yield Case(
-        "viseme_comes_and_goes",
-        "FAP 1 and FAP 2 sent, not sent, and sent again",
-        _high_level_changes,
-    )
+    yield Case("viseme_comes_and_goes", "FAP 1 and FAP 2 sent, not sent, and sent again", _high_level_changes)
 
 
 def plane_cases() -> Iterator[Case]:
@@ -101,15 +90,13 @@ def plane_cases() -> Iterator[Case]:
         "a face alone; an I plane with both; later I planes with one half do not touch the other",
         _body_joins,
     )
-    yield Case("all_intra", "I planes only", lambda: write_stream(script(faces(8, FEW_FAPS), intra=range(8))))
+    yield Case("all_intra", "I planes only", scripted(faces(8, FEW_FAPS), intra=range(8)))
     yield Case(
         "intra_period",
         "every third plane is an I plane: counts start again, values do not depend on those before",
-        lambda: write_stream(script(faces(18, FEW_FAPS), bodies(18, FEW_BAPS), intra=range(0, 18, 3))),
+        scripted(faces(18, FEW_FAPS), bodies(18, FEW_BAPS), intra=range(0, 18, 3)),
     )
-    yield Case(
-        "one_plane", "a single I plane", lambda: write_stream(script(faces(1, FEW_FAPS), bodies(1, FEW_BAPS)))
-    )
+    yield Case("one_plane", "a single I plane", scripted(faces(1, FEW_FAPS), bodies(1, FEW_BAPS)))
     yield Case(
         "gender",
         "suggested_gender 1 for the face, for the body, and for both",
@@ -127,7 +114,7 @@ def plane_cases() -> Iterator[Case]:
     yield Case(
         "flags",
         "viseme_def, init_face and expression_def in all combinations, in I and P planes",
-        lambda: write_stream(script([_flags(frame) for frame in range(16)], intra=(0, 8))),
+        scripted([_flags(frame) for frame in range(16)], intra=(0, 8)),
     )
 
 

@@ -14,6 +14,7 @@ from tools.vectors.definitions._targets import (
     edited,
     faces,
     script,
+    scripted,
 )
 from tools.vectors.definitions.case import Case
 from tools.vectors.stream_writer import WIDEST, Header, Plane, write_stream
@@ -33,26 +34,22 @@ def _default_range_cases() -> Iterator[Case]:
     yield Case(
         "fap_default_ranges",
         "no lists: the standard's limits of FAPs, both signs; FAP 47 1080 and 420, FAP 63 720",
-        lambda: write_stream(script(faces(8, LOW_LEVEL, seed=9), intra=(0, 4), fap=_NONE)),
+        scripted(faces(8, LOW_LEVEL, seed=9), intra=(0, 4), fap=_NONE),
     )
     yield Case(
         "fap_default_ranges_quantised",
         "the same divided by fap_quant 7, towards 0",
-        lambda: write_stream(
-            script(faces(8, LOW_LEVEL, seed=10), intra=(0, 4), fap=Header(quant=7, lists="0000"))
-        ),
+        scripted(faces(8, LOW_LEVEL, seed=10), intra=(0, 4), fap=Header(quant=7, lists="0000")),
     )
     yield Case(
         "bap_default_ranges",
         "no lists: the standard's limits of BAPs 1 to 186",
-        lambda: write_stream(script(None, bodies(6, STANDARD_BAPS, seed=9), intra=(0, 3), bap=_NONE)),
+        scripted(None, bodies(6, STANDARD_BAPS, seed=9), intra=(0, 3), bap=_NONE),
     )
     yield Case(
         "bap_default_ranges_quantised",
         "the same divided by bap_pred_scale 11, towards 0",
-        lambda: write_stream(
-            script(None, bodies(6, STANDARD_BAPS, seed=10), intra=(0, 3), bap=Header(quant=7, lists="0000"))
-        ),
+        scripted(None, bodies(6, STANDARD_BAPS, seed=10), intra=(0, 3), bap=Header(quant=7, lists="0000")),
     )
 
 
@@ -76,51 +73,40 @@ def _alphabet_cases() -> Iterator[Case]:
     yield Case(
         "alphabet_of_one",
         "ranges 0 to 0: symbols that take no bits",
-        lambda: write_stream(
-            script(
-                [dict.fromkeys(FEW_FAPS, 0)] * 6,
-                [dict.fromkeys(FEW_BAPS, 0)] * 6,
-                intra=(0, 3),
-                fap=Header(code=0),
-                bap=Header(code=0),
-            )
+        scripted(
+            [dict.fromkeys(FEW_FAPS, 0)] * 6,
+            [dict.fromkeys(FEW_BAPS, 0)] * 6,
+            intra=(0, 3),
+            fap=Header(code=0),
+            bap=Header(code=0),
         ),
     )
     yield Case(
         "alphabets_after_division",
         "ranges that fap_quant 31 leaves 1, 3 and 5 symbols of",
-        lambda: write_stream(
-            script(
-                faces(8, (3, 4, 5, 6)),
-                fap=Header(
-                    quant=31,
-                    codes={3: (0, 0, 0, 0), 4: (1, 1, 1, 1), 5: (2, 0, 1, 1), 6: (2, 2, 2, 2)},
-                ),
-            )
+        scripted(
+            faces(8, (3, 4, 5, 6)),
+            fap=Header(quant=31, codes={3: (0, 0, 0, 0), 4: (1, 1, 1, 1), 5: (2, 0, 1, 1), 6: (2, 2, 2, 2)}),
         ),
     )
     yield Case(
         "one_sided",
         "ranges from 0 up, and from 0 down",
-        lambda: write_stream(
-            script(
-                faces(8, (3, 4, 5)),
-                bodies(8, (1, 19)),
-                fap=Header(codes={3: (18, 0, 10, 0), 4: (0, 10, 0, 10)}),
-                bap=Header(codes={1: (31, 0, 31, 0), 19: (0, 31, 0, 31)}),
-            )
+        scripted(
+            faces(8, (3, 4, 5)),
+            bodies(8, (1, 19)),
+            fap=Header(codes={3: (18, 0, 10, 0), 4: (0, 10, 0, 10)}),
+            bap=Header(codes={1: (31, 0, 31, 0), 19: (0, 31, 0, 31)}),
         ),
     )
     yield Case("ranges_persist", "ranges stay in force while masks and quantisers change", _persist)
     yield Case(
         "differences_too_large",
         "differences that no range holds: an I plane for each",
-        lambda: write_stream(
-            script(
-                [{3: 3720 * (-1) ** frame, 4: 10 * frame} for frame in range(8)],
-                intra=range(8),
-                fap=Header(code=WIDEST),
-            )
+        scripted(
+            [{3: 3720 * (-1) ** frame, 4: 10 * frame} for frame in range(8)],
+            intra=range(8),
+            fap=Header(code=WIDEST),
         ),
     )
 

@@ -7,15 +7,7 @@ from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 
-from tools.vectors.definitions._targets import (
-    FEW_BAPS,
-    FEW_FAPS,
-    RATE_25,
-    bodies,
-    edited,
-    faces,
-    script,
-)
+from tools.vectors.definitions._targets import FEW_BAPS, FEW_FAPS, RATE_25, bodies, edited, faces, script
 from tools.vectors.definitions.case import Case
 from tools.vectors.stream_writer import (
     END,
@@ -162,10 +154,7 @@ def surrounding_cases() -> Iterator[Case]:
         encodes=False,
     )
     yield Case(
-        "no_end_code_whole_byte",
-        "the same, with a last byte of stuffing",
-        _ending_with_a_byte,
-        encodes=False,
+        "no_end_code_whole_byte", "the same, with a last byte of stuffing", _ending_with_a_byte, encodes=False
     )
     for bits in range(1, 9):
         yield Case(

@@ -5,7 +5,7 @@ Random modules may change their sequences, so the noise comes from a generator d
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +20,7 @@ from fba.parameters import (
     baps,
     faps,
 )
-from tools.vectors.stream_writer import Header, Plane, Values
+from tools.vectors.stream_writer import Header, Plane, Values, write_stream
 
 LOW_LEVEL = tuple(range(3, FAP_COUNT + 1))
 STANDARD_BAPS = tuple(range(1, BAP_STANDARD_COUNT + 1))
@@ -128,6 +128,11 @@ def script(
         )
         for number in range(count)
     ]
+
+
+def scripted(*values: Sequence[Values] | None, **options: Any) -> Callable[[], bytes]:
+    """Return a maker of the stream that `script` describes."""
+    return lambda: write_stream(script(*values, **options))
 
 
 def edited(planes: Sequence[Plane], edits: Mapping[int, Mapping[str, Any]]) -> list[Plane]:

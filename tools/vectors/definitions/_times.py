@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from tools.vectors.definitions._targets import FEW_BAPS, FEW_FAPS, bodies, edited, faces, script
+from tools.vectors.definitions._targets import FEW_BAPS, FEW_FAPS, bodies, edited, faces, script, scripted
 from tools.vectors.definitions.case import Case
 from tools.vectors.stream_writer import PLANE, write_stream
 
@@ -62,7 +62,7 @@ def _rate_cases() -> Iterator[Case]:
         ),
     )  # fmt: skip
     yield Case(
-        "rate_missing", "no frame rate anywhere", lambda: write_stream(script(faces(5, (3,)), rate=None)),
+        "rate_missing", "no frame rate anywhere", scripted(faces(5, (3,)), rate=None),
         times=False,
     )  # fmt: skip
 

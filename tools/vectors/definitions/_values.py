@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from fba.parameters import (
-    BAP_STEP_TABLES,
-    EXPRESSION_SELECT_MAX,
-    INTENSITY_MAX,
-    VISEME_SELECT_MAX,
-    BapTable,
-)
+from fba.parameters import BAP_STEP_TABLES, EXPRESSION_SELECT_MAX, INTENSITY_MAX, VISEME_SELECT_MAX, BapTable
 from tools.vectors.definitions._targets import (
     EXTENSION_BAPS,
     FEW_BAPS,
@@ -21,6 +15,7 @@ from tools.vectors.definitions._targets import (
     bodies,
     faces,
     script,
+    scripted,
 )
 from tools.vectors.definitions.case import Case
 from tools.vectors.stream_writer import WIDEST, Header, Plane, Values, write_stream
@@ -34,20 +29,16 @@ _INT32_MAX = 2**31 - 1
 
 def first_cases() -> Iterator[Case]:
     """Yield the streams with which to begin."""
-    yield Case("jaw", "FAP 3 alone", lambda: write_stream(script(faces(6, (3,)))))
-    yield Case("face", "all 66 low-level FAPs", lambda: write_stream(script(faces(12))))
-    yield Case(
-        "viseme",
-        "FAP 1: selects, blend, viseme_def",
-        lambda: write_stream(script(faces(16, (3,), viseme=True))),
-    )
+    yield Case("jaw", "FAP 3 alone", scripted(faces(6, (3,))))
+    yield Case("face", "all 66 low-level FAPs", scripted(faces(12)))
+    yield Case("viseme", "FAP 1: selects, blend, viseme_def", scripted(faces(16, (3,), viseme=True)))
     yield Case(
         "expression",
         "FAP 2: selects, intensities, init_face, expression_def",
-        lambda: write_stream(script(faces(16, (3,), expression=True))),
+        scripted(faces(16, (3,), expression=True)),
     )
-    yield Case("pelvis", "BAPs 1 to 3 alone", lambda: write_stream(script(None, bodies(6, (1, 2, 3)))))
-    yield Case("body", "BAPs 1 to 186", lambda: write_stream(script(None, bodies(8))))
+    yield Case("pelvis", "BAPs 1 to 3 alone", scripted(None, bodies(6, (1, 2, 3))))
+    yield Case("body", "BAPs 1 to 186", scripted(None, bodies(8)))
     yield Case(
         "body_visage",
         "BAPs 1 to 186 with the vendor's steps",
@@ -57,12 +48,12 @@ def first_cases() -> Iterator[Case]:
     yield Case(
         "face_and_body",
         "FAPs 1 to 68 and BAPs 1 to 186 in one plane",
-        lambda: write_stream(script(faces(6, viseme=True, expression=True), bodies(6))),
+        scripted(faces(6, viseme=True, expression=True), bodies(6)),
     )
     yield Case(
         "extension_baps",
         "the user-defined BAPs 187 to 296, with the ranges that they need",
-        lambda: write_stream(script(None, bodies(6, EXTENSION_BAPS))),
+        scripted(None, bodies(6, EXTENSION_BAPS)),
     )
 
 
@@ -87,9 +78,7 @@ def quantiser_cases() -> Iterator[Case]:
     yield Case(
         "quantisers_differ",
         "fap_quant 6 and bap_quant 9 in the same planes",
-        lambda: write_stream(
-            script(faces(10, FEW_FAPS), bodies(10, FEW_BAPS), fap=Header(quant=6), bap=Header(quant=9))
-        ),
+        scripted(faces(10, FEW_FAPS), bodies(10, FEW_BAPS), fap=Header(quant=6), bap=Header(quant=9)),
     )
 
 
@@ -131,64 +120,52 @@ def extreme_cases() -> Iterator[Case]:
     yield Case(
         "fap_limits",
         "FAPs at the ends of the standard's ranges in I planes, and differences at theirs",
-        lambda: write_stream(script(_alternating(LOW_LEVEL, 8), intra=(0, 1, 4))),
+        scripted(_alternating(LOW_LEVEL, 8), intra=(0, 1, 4)),
     )
     yield Case(
         "fap_widest",
         "FAPs at 1860 steps and beyond: the widest ranges, and differences added up",
-        lambda: write_stream(
-            script(_alternating(FEW_FAPS, 12, each=3), intra=(0, 1), fap=Header(code=WIDEST))
-        ),
+        scripted(_alternating(FEW_FAPS, 12, each=3), intra=(0, 1), fap=Header(code=WIDEST)),
     )
     yield Case(
         "bap_limits",
         "BAPs at the ends of the standard's ranges in I planes, and differences at theirs",
-        lambda: write_stream(script(None, _alternating(STANDARD_BAPS, 8), intra=(0, 1, 4))),
+        scripted(None, _alternating(STANDARD_BAPS, 8), intra=(0, 1, 4)),
     )
     yield Case(
         "bap_widest",
         "BAPs at 1860 steps and beyond, extension BAPs, too",
-        lambda: write_stream(
-            script(
-                None,
-                _alternating((*FEW_BAPS, *EXTENSION_BAPS[::9]), 12, each=3),
-                intra=(0, 1),
-                bap=Header(code=WIDEST),
-            )
+        scripted(
+            None,
+            _alternating((*FEW_BAPS, *EXTENSION_BAPS[::9]), 12, each=3),
+            intra=(0, 1),
+            bap=Header(code=WIDEST),
         ),
     )
     yield Case(
         "unquantised",
         "quantisers 0: values as they are, odd ones, too",
-        lambda: write_stream(
-            script(
-                _odd(FEW_FAPS),
-                _odd(FEW_BAPS),
-                intra=(0, 5),
-                fap=Header(quant=0),
-                bap=Header(quant=0),
-            )
-        ),
+        scripted(_odd(FEW_FAPS), _odd(FEW_BAPS), intra=(0, 5), fap=Header(quant=0), bap=Header(quant=0)),
     )
     yield Case(
         "visemes",
         "every viseme as select1 and select2; blends 0, 63 and between; differences -14 to 14",
-        lambda: write_stream(script(_visemes(), intra=(0, 8))),
+        scripted(_visemes(), intra=(0, 8)),
     )
     yield Case(
         "expressions",
         "every expression as select1 and select2; intensities 0, 63 and between",
-        lambda: write_stream(script(_expressions(), intra=(0, 7))),
+        scripted(_expressions(), intra=(0, 7)),
     )
     yield Case(
         "amounts_rounded",
         "fap_quant 25: blends and intensities of 63 become 75, more than a frame says",
-        lambda: write_stream(script(_amounts(), intra=(0, 4), fap=Header(quant=25))),
+        scripted(_amounts(), intra=(0, 4), fap=Header(quant=25)),
     )
     yield Case(
         "bap_int32",
         "BAPs 123 and 124 raised and lowered to the ends of 32 bits, in as few planes as that takes",
-        lambda: write_stream(script(None, _ramps(), bap=Header(code=WIDEST))),
+        scripted(None, _ramps(), bap=Header(code=WIDEST)),
     )
 
 

@@ -202,10 +202,7 @@ def _headers() -> Iterator[Fault]:
             times=True,
         )
     yield Fault(
-        "extension_without_ranges",
-        "an extension BAP for which no range was ever sent",
-        _without_ranges,
-        2,
+        "extension_without_ranges", "an extension BAP for which no range was ever sent", _without_ranges, 2
     )
 
 
