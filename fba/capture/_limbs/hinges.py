@@ -22,10 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba import rotations
-from fba.arrays import Float64
+from fba.arrays import Float64, UInt8
 from fba.capture._limbs._coupled_paths import chain
 from fba.capture._limbs.bone_ik import aim
-from fba.compiled import compiled, inlined
+from fba.compiled import compiled
 
 TWIST_WEIGHT = 0.3
 """Weight of the computed twists in the last step, relative to that of the lower bone's direction: a limb that
@@ -52,6 +52,8 @@ TURNING_SPEED = 2.0
 """Speed of turning, in radians per second, that costs 1 per second."""
 USUAL_DISTANCE = 5.0
 """Distance from the usual turn, in radians, that costs 1 per second."""
+FRAMES_PER_CALL = 1024
+"""Frames whose costs are in memory at once."""
 MAX_ITERATIONS = 12
 """Largest number of iterations of Newton's method."""
 MAX_STEP = 0.2
@@ -142,24 +144,11 @@ def _flexion(hinge: Hinge, direction: Float64, turn: Float64, twist: Float64) ->
     return result
 
 
-@inlined
-def _cost(sideways: float, natural: float, away: float) -> float:
-    """Return the cost per second: see the constants above."""
-    wrong = max(0.0, -natural) / WRONG_BEND
+def _cost(sideways: Float64, natural: Float64, away: Float64) -> Float64:
+    """Return the cost per second of each state: see the constants above."""
     square = (sideways / STEEP_ERROR) ** 2
-    return (
-        (sideways / SIDEWAYS_ERROR) ** 2
-        + square * square * square
-        + wrong * wrong
-        + (away / USUAL_DISTANCE) ** 2
-    )
-
-
-@inlined
-def _away(turn: float, usual: float) -> float:
-    """Return the distance from the usual turn, in -pi..pi."""
-    difference = turn - usual
-    return difference - TURN * math.floor(difference / TURN + 0.5)
+    cost = (sideways / SIDEWAYS_ERROR) ** 2 + square * square * square  # powers are many times slower
+    return cost + (np.minimum(natural, 0.0) / WRONG_BEND) ** 2 + (away / USUAL_DISTANCE) ** 2
 
 
 def _follow(
@@ -171,111 +160,85 @@ def _follow(
     the hinge's plane, and how far on the side that the hinge bends to. ease: (T,), 1 or less, factor of the
     cost of turning since the frame before. usual: the turn without any other cost. period: seconds per frame.
     IndexError for arrays of other lengths.
-
-    Bounds of the loops: with these lengths, frames are places in all arrays; states are below STATES, and
-    shifts as well, so that their sum is below 2 STATES.
     """
     if not len(sideways) == len(natural) == len(ease) == len(path):
         raise IndexError("a hinge's arrays have different lengths")
-    _search(sideways, natural, ease, usual, period, path)
+    path[:] = _best_on_grid(sideways, natural, ease, usual, period)
     centre = usual + TURN * math.floor((float(np.median(path)) - usual) / TURN + 0.5)
     _refine(sideways, natural, ease, centre, period, path)
 
 
+def _best_on_grid(sideways: Float64, natural: Float64, ease: Float64, usual: float, period: float) -> Float64:
+    """Return the best path (T,) over the grid, by dynamic programming; arguments as of `_follow`."""
+    states = np.arange(STATES)
+    turns = states * (TURN / STATES)
+    waves = np.stack([np.ones(STATES), np.cos(turns), np.sin(turns)])
+    away = np.mod(turns - usual + math.pi, TURN) - math.pi
+    change = (np.minimum(states, STATES - states) * (TURN / STATES) / TURNING_SPEED) ** 2 / period
+    best, twice = np.zeros(STATES), np.zeros(2 * STATES)
+    origin = np.zeros((len(ease), STATES), dtype=np.uint8)
+    for start in range(0, len(ease), FRAMES_PER_CALL):
+        part = slice(start, start + FRAMES_PER_CALL)
+        cost = period * _cost(sideways[part] @ waves, natural[part] @ waves, away)
+        _search(cost, ease[part], change, twice, best, origin[part])
+    path = np.empty(len(ease), dtype=np.int64)
+    state = int(best.argmin())
+    for t in range(len(ease) - 1, -1, -1):
+        path[t] = state
+        state = (state + int(origin[t, state])) % STATES
+    return np.asarray(np.unwrap(path, period=STATES) * (TURN / STATES))
+
+
 @compiled
 def _search(
-    sideways: Float64, natural: Float64, ease: Float64, usual: float, period: float, path: Float64
+    cost: Float64, ease: Float64, change: Float64, twice: Float64, best: Float64, origin: UInt8
 ) -> None:
-    """Fill path with the best one over the grid: dynamic programming. Bounds: see `_follow`."""
-    count = path.shape[0]
-    step = TURN / STATES
-    sines = np.zeros(STATES)
-    cosines = np.zeros(STATES)
-    away = np.zeros(STATES)
-    change = np.zeros(STATES)
-    for state in range(STATES):
-        sines[state] = math.sin(state * step)
-        cosines[state] = math.cos(state * step)
-        away[state] = _away(state * step, usual)
-        steps = min(state, STATES - state)
-        change[state] = (steps * step / TURNING_SPEED) ** 2 / period
-    origin = np.zeros((count, STATES), dtype=np.uint8)
-    cost = np.zeros(STATES)
-    twice = np.zeros(2 * STATES)
-    best = np.zeros(STATES)
-    for t in range(count):
-        if t > 0:
-            for state in range(STATES):
-                twice[state] = cost[state]
-                twice[state + STATES] = cost[state]
-                best[state] = math.inf
-            for shift in range(STATES):
-                for state in range(STATES):
-                    total = float(twice[state + shift]) + float(ease[t]) * float(change[shift])
-                    if total < best[state]:
-                        best[state] = total
-                        origin[t, state] = shift
+    """Add cost (T, STATES) to that of the best way to each state, best (STATES,), frame after frame.
+
+    origin (T, STATES): how many states further each state's predecessor is. change (STATES,): cost of such a
+    step. twice: scratch. Bounds: `_best_on_grid` makes all arrays; states and shifts are below STATES, so
+    that their sum is below 2 STATES.
+    """
+    for t in range(len(cost)):
         for state in range(STATES):
-            c = cosines[state]
-            s = sines[state]
-            missed = sideways[t, 0] + sideways[t, 1] * c + sideways[t, 2] * s
-            bent = natural[t, 0] + natural[t, 1] * c + natural[t, 2] * s
-            cost[state] = best[state] + period * _cost(missed, bent, float(away[state]))
-    state = int(np.argmin(cost))
-    for t in range(count - 1, -1, -1):
-        path[t] = state * step
-        state = (state + int(origin[t, state])) % STATES
-    for t in range(1, count):
-        path[t] = path[t - 1] + _away(path[t], path[t - 1])
+            twice[state] = twice[state + STATES] = best[state]
+            best[state] = math.inf
+        for shift in range(STATES):
+            step = ease[t] * change[shift]
+            for state in range(STATES):
+                total = twice[state + shift] + step
+                if total < best[state]:
+                    best[state] = total
+                    origin[t, state] = shift
+        for state in range(STATES):
+            best[state] += cost[t, state]
 
 
-@compiled
 def _refine(
     sideways: Float64, natural: Float64, ease: Float64, centre: float, period: float, path: Float64
 ) -> None:
     """Improve path by Newton's method, whose equations couple each frame with its neighbours only.
 
-    centre: the usual turn plus the number of full turns that brings it closest to the path. Bounds: see
-    `follow`.
+    centre: the usual turn plus the number of full turns that brings it closest to the path.
     """
-    count = path.shape[0]
-    stiff = 2.0 / (TURNING_SPEED * TURNING_SPEED * period)
-    weights = np.zeros(count)
-    right = np.zeros(count)
-    move = np.zeros(count)
-    bonds = stiff * ease[1:]
+    bonds = 2.0 / (TURNING_SPEED * TURNING_SPEED * period) * ease[1:]
+    move = np.zeros(len(path))
     for _ in range(MAX_ITERATIONS):
-        for t in range(count):
-            c = math.cos(path[t])
-            s = math.sin(path[t])
-            missed = sideways[t, 0] + sideways[t, 1] * c + sideways[t, 2] * s
-            slope = sideways[t, 2] * c - sideways[t, 1] * s
-            bent = natural[t, 0] + natural[t, 1] * c + natural[t, 2] * s
-            bending = natural[t, 2] * c - natural[t, 1] * s
-            square = (missed / STEEP_ERROR) ** 2
-            pull = (
-                2.0 * missed * slope / (SIDEWAYS_ERROR * SIDEWAYS_ERROR)
-                + 6.0 * square * square * missed * slope / STEEP_ERROR**2
-            )
-            curve = (
-                2.0 * slope * slope / (SIDEWAYS_ERROR * SIDEWAYS_ERROR)
-                + 30.0 * square * square * slope * slope / STEEP_ERROR**2
-            )
-            if bent < 0.0:
-                pull += 2.0 * bent * bending / (WRONG_BEND * WRONG_BEND)
-                curve += 2.0 * bending * bending / (WRONG_BEND * WRONG_BEND)
-            pull += 2.0 * (path[t] - centre) / (USUAL_DISTANCE * USUAL_DISTANCE)
-            curve += 2.0 / (USUAL_DISTANCE * USUAL_DISTANCE)
-            weights[t] = period * curve
-            right[t] = -period * pull
-            if t > 0:
-                difference = path[t] - path[t - 1]
-                right[t] -= bonds[t - 1] * difference
-                right[t - 1] += bonds[t - 1] * difference
+        c, s = np.cos(path), np.sin(path)
+        missed = sideways[:, 0] + sideways[:, 1] * c + sideways[:, 2] * s
+        slope = sideways[:, 2] * c - sideways[:, 1] * s
+        bent = np.minimum(natural[:, 0] + natural[:, 1] * c + natural[:, 2] * s, 0.0)
+        bending = np.where(bent < 0.0, natural[:, 2] * c - natural[:, 1] * s, 0.0)
+        steep = ((missed / STEEP_ERROR) ** 2 / STEEP_ERROR) ** 2
+        pull = missed * slope * (2.0 / SIDEWAYS_ERROR**2 + 6.0 * steep)
+        pull += 2.0 / WRONG_BEND**2 * bent * bending + 2.0 / USUAL_DISTANCE**2 * (path - centre)
+        curve = slope * slope * (2.0 / SIDEWAYS_ERROR**2 + 30.0 * steep)
+        curve += 2.0 / WRONG_BEND**2 * bending * bending + 2.0 / USUAL_DISTANCE**2
+        weights, right = period * curve, -period * pull
+        difference = bonds * np.diff(path)
+        right[1:] -= difference
+        right[:-1] += difference
         chain(weights, bonds, right, move)
-        largest = 0.0
-        for t in range(count):
-            largest = max(largest, abs(move[t]))
-            path[t] += min(max(move[t], -MAX_STEP), MAX_STEP)
-        if largest < MAX_CHANGE:
+        path += np.clip(move, -MAX_STEP, MAX_STEP)
+        if np.abs(move).max(initial=0.0) < MAX_CHANGE:
             break

@@ -17,6 +17,7 @@ from fba.face.deform._normals import build_surface
 from fba.face.deform.flat_tables import (
     VALUE_MAX,
     FlatModel,
+    MovingMesh,
     all_vertices,
     bound_points,
     flatten_shifts,
@@ -40,22 +41,23 @@ def _flat_model(model: FaceModel) -> FlatModel:
     tables = _flat_models.get(model)
     if tables is None:
         tables = _flat_models[model] = _flatten(model)
-    shifts, surface, points = tables.shifts, tables.surface, tables.point_shifts
+    mesh, points = tables.mesh, tables.point_shifts
+    shifts, surface = mesh.shifts, mesh.surface
     return tables._replace(
-        shifts=shifts._replace(amount=np.zeros_like(shifts.amount)),
-        surface=surface._replace(sums=np.zeros_like(surface.sums), units=np.zeros_like(surface.units)),
+        mesh=mesh._replace(
+            shifts=shifts._replace(amount=np.zeros_like(shifts.amount)),
+            surface=surface._replace(sums=np.zeros_like(surface.sums), units=np.zeros_like(surface.units)),
+        ),
         point_shifts=points._replace(amount=np.zeros_like(points.amount)),
     )
 
 
 def _flatten(model: FaceModel) -> FlatModel:
     shifts = flatten_shifts(model, all_vertices(model), np.float32)
+    starts = np.cumsum([0, *(len(part.vertices) for part in model.parts)], dtype=np.int64)
     return FlatModel(
-        rest=model.vertices,
-        part_start=np.cumsum([0, *(len(part.vertices) for part in model.parts)], dtype=np.int64),
-        shifts=shifts,
+        mesh=MovingMesh(model.vertices, starts, shifts, build_surface(model, shifts.rows)),
         transforms=flatten_transforms(model),
-        surface=build_surface(model, shifts.rows),
         point_shifts=flatten_shifts(model, bound_points(model), np.float64),
         owner=_find_owners(model),
     )
@@ -88,13 +90,13 @@ class Deformer:
         self.model = model
         self._loops = loops
         self._tables = _flat_model(model)
-        self._scratch = loops.allocate_scratch(len(model.vertices), len(model.parts))
+        self._scratch = loops.allocate_scratch(len(model.vertices), len(model.parts), FRAMES_PER_CALL)
         self._lock = threading.Lock()
 
     @property
     def normal_groups(self) -> UInt32:
         """uint32 (V,): equal for vertices that share a normal, as those along the seam of a texture do."""
-        return self._tables.surface.sum_of
+        return self._tables.mesh.surface.sum_of
 
     def __call__(
         self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None
@@ -124,7 +126,7 @@ class Deformer:
         For column vectors: `calling = matrix . local`. Errors as when called.
         """
         values, single = frame_values(faps)
-        matrices = self._poses(values)[:, -1]
+        matrices = self._matrices(values)[:, -1]
         return matrices[0] if single else matrices
 
     def part_matrices(self, faps: npt.ArrayLike) -> Float64:
@@ -136,7 +138,7 @@ class Deformer:
         transforms; FaceDefMesh is not included. Errors as when called.
         """
         values, single = frame_values(faps)
-        matrices = self._poses(values)[:, :-1]
+        matrices = self._matrices(values)[:, :-1]
         return matrices[0] if single else matrices
 
     def feature_points(self, faps: npt.ArrayLike, *, local: bool = False) -> Float64:
@@ -149,24 +151,29 @@ class Deformer:
         """
         values, single = frame_values(faps)
         points: Float64 = np.empty((len(values), len(names()), 3))
+        owner = self._tables.owner
+        if not local:
+            owner = np.where(owner < 0, len(self.model.parts), owner)  # the head's is the last pose
         with np.errstate(all="ignore"):
             self._loops.points_of_frames(
                 values,
+                self._poses(values, with_head=not local),
                 self.model.points,
-                self._tables.owner,
+                owner,
                 self._tables.point_shifts,
-                self._tables.transforms,
-                not local,
                 points,
             )
         return points[0] if single else points
 
-    def _poses(self, values: Float64) -> Float64:
+    def _poses(self, values: Float64, *, with_head: bool = False) -> Float64:
+        """Return (T, P + 1, 3, 4): what `poses_of_frames` writes for FAPs (T, 68)."""
+        poses = np.empty((len(values), len(self.model.parts) + 1, 3, 4))
+        self._loops.poses_of_frames(values, self._tables.transforms, with_head, poses)
+        return poses
+
+    def _matrices(self, values: Float64) -> Float64:
         matrices = np.zeros((len(values), len(self.model.parts) + 1, 4, 4))
-        matrices[..., 3, 3] = 1
-        top = np.empty((*matrices.shape[:2], 3, 4))
-        self._loops.poses_of_frames(values, self._tables.transforms, top)
-        matrices[..., :3, :] = top
+        matrices[..., :3, :], matrices[..., 3, 3] = self._poses(values), 1
         return matrices
 
     def _run(
@@ -180,14 +187,11 @@ class Deformer:
         normal_frames = out_frames[:0] if normals is None else normals[None] if single else normals
         with self._lock, np.errstate(all="ignore"):
             for start in range(0, len(values), FRAMES_PER_CALL):
-                stop = start + FRAMES_PER_CALL
+                part, scratch = slice(start, start + FRAMES_PER_CALL), self._scratch
+                frames = values[part]
+                self._loops.poses_of_frames(frames, self._tables.transforms, with_head, scratch.poses)
                 self._loops.deform_frames(
-                    values[start:stop],
-                    self._tables,
-                    self._scratch,
-                    with_head,
-                    out_frames[start:stop],
-                    normal_frames[start:stop],
+                    frames, self._tables.mesh, scratch, out_frames[part], normal_frames[part]
                 )
         return out
 

@@ -11,29 +11,22 @@ import numpy as np
 
 from fba.arrays import Float32, Float64, Int64
 from fba.compiled import compiled
-from fba.face.deform._loops import compose, transform_points
-from fba.face.deform.flat_tables import FlatModel, Shifts
+from fba.face.deform._loops import transform_points
+from fba.face.deform.flat_tables import MovingMesh, Shifts
 
 
 class Scratch(NamedTuple):
-    """Working arrays for one frame: (V, 3) twice, poses (P + 1, 3, 4) twice, and a pose of 32 bits."""
+    """Working arrays for one frame: (V, 3) twice, and a pose (3, 4) of 32 bits."""
 
     one: Float32
     other: Float32
-    one_poses: Float64
-    other_poses: Float64
     pose: Float32
 
 
-def allocate_scratch(vertices: int, parts: int) -> Scratch:
-    """Return working arrays for a face of this number of vertices and parts."""
-    return Scratch(
-        np.zeros((vertices, 3), dtype=np.float32),
-        np.zeros((vertices, 3), dtype=np.float32),
-        np.zeros((parts + 1, 3, 4)),
-        np.zeros((parts + 1, 3, 4)),
-        np.zeros((3, 4), dtype=np.float32),
-    )
+def allocate_scratch(vertices: int) -> Scratch:
+    """Return working arrays for a face of this number of vertices."""
+    one, other = np.zeros((2, vertices, 3), dtype=np.float32)
+    return Scratch(one, other, np.zeros((3, 4), dtype=np.float32))
 
 
 @compiled
@@ -101,43 +94,45 @@ def _add_part(shifts: Shifts, part: int, one: Float64, other: Float64, apart: bo
 
 @compiled
 def measure_frames(
-    one: Float64,
-    other: Float64,
-    tables: FlatModel,
+    pair: Float64,
+    poses: Float64,
+    mesh: MovingMesh,
     scratch: Scratch,
     farthest: tuple[Float64, Int64],
     unit: float,
     counts: Int64,
 ) -> None:
-    """Measure how far vertices are apart, in the head's frame, by FAPs `one` and `other` (T, 68).
+    """Measure how far vertices are apart, in the head's frame, by FAPs `pair` (2, T, 68).
 
-    farthest: (T,) each, set to the largest distance in a frame, metres, and its vertex. counts: int64 (B,),
-    raised for every vertex that moved: the number n for up to n units, the last one for all beyond.
+    poses: (2, T, P + 1, 3, 4) as of `poses_of_frames`. farthest: (T,) each, set to the largest distance in a
+    frame, metres, and its vertex. counts: int64 (B,), raised for every vertex that moved: the number n for up
+    to n units, the last one for all beyond.
     """
     largest, worst = farthest
-    part_start, shifts = tables.part_start, tables.shifts
-    poses, others = scratch.one_poses, scratch.other_poses
-    for frame in range(len(one)):
-        compose(one[frame], tables.transforms, poses)
-        compose(other[frame], tables.transforms, others)
+    part_start, shifts = mesh.part_start, mesh.shifts
+    for frame in range(pair.shape[1]):
+        one, other = pair[0, frame], pair[1, frame]
         most, place = 0.0, 0
-        for part in range(len(poses) - 1):
+        for part in range(len(part_start) - 1):
             start, stop = int(part_start[part]), int(part_start[part + 1])
             first, second = scratch.one[start:stop], scratch.other[start:stop]
             turned = False
+            own, others = poses[0, frame, part], poses[1, frame, part]
             for row in range(3):
                 for column in range(4):
-                    turned = turned or poses[part, row, column] != others[part, row, column]
+                    turned = (
+                        turned or poses[0, frame, part, row, column] != poses[1, frame, part, row, column]
+                    )
             if turned:
-                first[:], second[:] = tables.rest[start:stop], tables.rest[start:stop]
-                _add_part(shifts, part, one[frame], other[frame], True, scratch)
-                scratch.pose[:] = others[part]
+                first[:], second[:] = mesh.rest[start:stop], mesh.rest[start:stop]
+                _add_part(shifts, part, one, other, True, scratch)
+                scratch.pose[:] = others
                 transform_points(scratch.pose, second, second)
             else:
                 first[:] = 0
-                if not _add_part(shifts, part, one[frame], other[frame], False, scratch):
+                if not _add_part(shifts, part, one, other, False, scratch):
                     continue
-            scratch.pose[:] = poses[part]
+            scratch.pose[:] = own
             if not turned:  # a difference has no place
                 scratch.pose[:, 3] = 0
             transform_points(scratch.pose, first, first)

@@ -18,7 +18,7 @@ import numpy as np
 from fba.arrays import Array, Float32, Float64, Int64
 from fba.compiled import compiled
 from fba.face.deform._normals import Surface
-from fba.face.deform.flat_tables import FlatModel, Shifts, Transforms
+from fba.face.deform.flat_tables import MovingMesh, Shifts, Transforms
 
 MIN_SQUARE = np.float32(1e-30)
 """Squared length of a sum of normals below which it has no direction."""
@@ -26,18 +26,6 @@ MAX_SQUARE = np.float32(1e30)
 """Squared length of a sum of normals above which products with it overflow."""
 ZERO = np.float32(0)
 ONE = np.float32(1)
-
-
-@compiled
-def copy(source: Array, target: Array) -> None:
-    """Copy a contiguous array to another of its shape.
-
-    Runs faster than `target[:] = source`, which iterates over rows and columns, and compiles faster, as it
-    needs no error for shapes that differ.
-    """
-    values, result = source.reshape(-1), target.reshape(-1)
-    for k in range(len(values)):
-        result[k] = values[k]
 
 
 @compiled
@@ -73,63 +61,55 @@ def add_shifts(values: Float64, shifts: Shifts, moved: Array, touched: Int64) ->
 
 
 @compiled
-def compose(values: Float64, transforms: Transforms, poses: Float64) -> None:
-    """Write to `poses` (P + 1, 3, 4) the product of each part's transforms, and last that of the head's."""
-    one = np.empty((3, 4))
-    product = np.empty((3, 4))
-    for part in range(len(poses)):
-        pose = poses[part]
-        pose[:] = 0.0
-        for axis in range(3):
-            pose[axis, axis] = 1.0
-        for k in range(int(transforms.start[part]), int(transforms.start[part + 1])):
-            value = values[transforms.column[k]]
-            if value == 0.0:
-                continue
-            transform_matrix(int(transforms.kind[k]), value, transforms.amount[k], transforms.centre[k], one)
-            multiply(pose, one, product)
-            copy(product, pose)
+def poses_of_frames(values: Float64, transforms: Transforms, with_head: bool, poses: Float64) -> None:
+    """Write to `poses` (T, P + 1, 3, 4) the product of each part's transforms by FAPs `values` (T, 68).
+
+    The last one is that of the head. with_head: those of parts are multiplied by it.
+    """
+    head = poses.shape[1] - 1
+    for frame in range(len(values)):
+        for down in range(head + 1):
+            pose = poses[frame, head - down]
+            for row in range(3):
+                for column in range(4):
+                    own = 1.0 if row == column else 0.0
+                    pose[row, column] = poses[frame, head, row, column] if with_head and down else own
+            for k in range(transforms.start[head - down], transforms.start[head - down + 1]):
+                value = values[frame, transforms.column[k]]
+                if value != 0.0:
+                    _transform(pose, transforms.kind[k], value, transforms.amount[k], transforms.centre[k])
 
 
 @compiled
-def transform_matrix(kind: int, value: float, amount: Float64, centre: Float64, result: Float64) -> None:
-    """Write one transform to `result` (3, 4); kind: index in `flat_tables.KIND_ORDER`."""
+def _transform(pose: Float64, kind: int, value: float, amount: Float64, centre: Float64) -> None:
+    """Multiply a pose (3, 4) by one transform, in place; kind: index in `flat_tables.KIND_ORDER`."""
     x, y, z = value * amount[0], value * amount[1], value * amount[2]
-    result[:] = 0.0
-    if kind == 0:
-        result[0, 0] = result[1, 1] = result[2, 2] = 1.0
-        result[0, 3], result[1, 3], result[2, 3] = x, y, z
-        return
+    px, py, pz = centre[0], centre[1], centre[2]
+    s, d = 0.0, 0.0
     if kind == 1:
         angle = np.sqrt(x * x + y * y + z * z)
-        if angle > 0.0:
-            x, y, z = x / angle, y / angle, z / angle
-        c, s = np.cos(angle), np.sin(angle)
-        d = 1.0 - c
-        result[0, 0], result[0, 1], result[0, 2] = x * x * d + c, x * y * d - z * s, x * z * d + y * s
-        result[1, 0], result[1, 1], result[1, 2] = y * x * d + z * s, y * y * d + c, y * z * d - x * s
-        result[2, 0], result[2, 1], result[2, 2] = z * x * d - y * s, z * y * d + x * s, z * z * d + c
-    else:
-        result[0, 0], result[1, 1], result[2, 2] = 1.0 + x, 1.0 + y, 1.0 + z
-    for axis in range(3):
-        turned = result[axis, 0] * centre[0] + result[axis, 1] * centre[1] + result[axis, 2] * centre[2]
-        result[axis, 3] = centre[axis] - turned
-
-
-@compiled
-def multiply(outer: Float64, inner: Float64, result: Float64) -> None:
-    """Write outer . inner to `result`; all (3, 4), with 0 0 0 1 as the fourth row."""
-    for i in range(3):
-        for j in range(4):
-            result[i, j] = outer[i, 0] * inner[0, j] + outer[i, 1] * inner[1, j] + outer[i, 2] * inner[2, j]
-        result[i, 3] += outer[i, 3]
-
-
-@compiled
-def poses_of_frames(values: Float64, transforms: Transforms, poses: Float64) -> None:
-    """Write to `poses` (T, P + 1, 3, 4) what `compose` does for each of FAPs `values` (T, 68)."""
-    for frame in range(len(values)):
-        compose(values[frame], transforms, poses[frame])
+        if angle == 0.0:
+            return
+        x, y, z = x / angle, y / angle, z / angle
+        s, d = np.sin(angle), 1.0 - np.cos(angle)
+    for row in range(3):
+        a, b, c = pose[row, 0], pose[row, 1], pose[row, 2]
+        if kind == 0:
+            pose[row, 3] += a * x + b * y + c * z
+            continue
+        before = a * px + b * py + c * pz
+        if kind == 1:
+            along = d * (a * x + b * y + c * z)
+            e, f, g = b * z - c * y, c * x - a * z, a * y - b * x
+            a, b, c = (
+                a - d * a + along * x + s * e,
+                b - d * b + along * y + s * f,
+                c - d * c + along * z + s * g,
+            )
+        else:
+            a, b, c = a + a * x, b + b * y, c + c * z
+        pose[row, 0], pose[row, 1], pose[row, 2] = a, b, c
+        pose[row, 3] += before - (a * px + b * py + c * pz)
 
 
 @compiled
@@ -146,16 +126,11 @@ def sum_normals(moved: Float32, surface: Surface, part: int) -> None:
         ux, uy, uz = moved[b, 0] - x, moved[b, 1] - y, moved[b, 2] - z
         vx, vy, vz = moved[c, 0] - x, moved[c, 1] - y, moved[c, 2] - z
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        i, j, m = corners[k, 0], corners[k, 1], corners[k, 2]
-        sum_x[i] += nx
-        sum_y[i] += ny
-        sum_z[i] += nz
-        sum_x[j] += nx
-        sum_y[j] += ny
-        sum_z[j] += nz
-        sum_x[m] += nx
-        sum_y[m] += ny
-        sum_z[m] += nz
+        for corner in range(3):
+            i = corners[k, corner]
+            sum_x[i] += nx
+            sum_y[i] += ny
+            sum_z[i] += nz
 
 
 @compiled
@@ -244,22 +219,19 @@ class Scratch(NamedTuple):
     touched: Int64
     """(P,) 1 where a FaceDefMesh of a FAP that is not 0 moves the part."""
     poses: Float64
-    """(P + 1, 3, 4), the head's last."""
-    combined: Float64
-    """(3, 4) the transforms of a part, then those of the head."""
+    """(N, P + 1, 3, 4) the poses of up to N frames, the head's last."""
     pose: Float32
-    """(3, 4) `combined` in the vertices' precision."""
+    """(3, 4) one of them in the vertices' precision."""
     turn: Float32
-    """(3, 3) `combined` for normals."""
+    """(3, 3) the same for normals."""
 
 
-def allocate_scratch(vertices: int, parts: int) -> Scratch:
-    """Return the working arrays for a face of this number of vertices and parts."""
+def allocate_scratch(vertices: int, parts: int, frames: int) -> Scratch:
+    """Return the working arrays for a face of this number of vertices and parts, up to N frames at once."""
     return Scratch(
         moved=np.empty((vertices, 3), dtype=np.float32),
         touched=np.zeros(parts, dtype=np.int64),
-        poses=np.empty((parts + 1, 3, 4)),
-        combined=np.empty((3, 4)),
+        poses=np.empty((frames, parts + 1, 3, 4)),
         pose=np.empty((3, 4), dtype=np.float32),
         turn=np.empty((3, 3), dtype=np.float32),
     )
@@ -267,59 +239,50 @@ def allocate_scratch(vertices: int, parts: int) -> Scratch:
 
 @compiled
 def deform_frames(
-    values: Float64, tables: FlatModel, scratch: Scratch, with_head: bool, out: Float32, normals: Float32
+    values: Float64, mesh: MovingMesh, scratch: Scratch, out: Float32, normals: Float32
 ) -> None:
     """Write the vertices for FAPs `values` (T, 68) to `out` and their normals to `normals`, both (T, V, 3).
 
-    normals: (0, V, 3) for none. with_head: apply the head's transforms.
+    normals: (0, V, 3) for none. The first T of `scratch.poses` must be those of the frames.
     """
-    part_start, surface = tables.part_start, tables.surface
+    part_start, surface, moved, pose = mesh.part_start, mesh.surface, scratch.moved, scratch.pose
     for frame in range(len(values)):
-        copy(tables.rest, scratch.moved)
+        for v in range(len(moved)):
+            moved[v, 0], moved[v, 1], moved[v, 2] = mesh.rest[v, 0], mesh.rest[v, 1], mesh.rest[v, 2]
         scratch.touched[:] = 0
-        add_shifts(values[frame], tables.shifts, scratch.moved, scratch.touched)
-        compose(values[frame], tables.transforms, scratch.poses)
-        head = len(scratch.poses) - 1
-        for part in range(head):
-            if with_head:
-                multiply(scratch.poses[head], scratch.poses[part], scratch.combined)
-            else:
-                copy(scratch.poses[part], scratch.combined)
-            copy(scratch.combined, scratch.pose)
+        add_shifts(values[frame], mesh.shifts, moved, scratch.touched)
+        for part in range(len(part_start) - 1):
+            combined = scratch.poses[frame, part]
+            for row in range(3):
+                for column in range(4):
+                    pose[row, column] = combined[row, column]
             start, stop = int(part_start[part]), int(part_start[part + 1])
-            transform_points(scratch.pose, scratch.moved[start:stop], out[frame, start:stop])
+            transform_points(pose, moved[start:stop], out[frame, start:stop])
             if len(normals) == 0:
                 continue
-            cofactors(scratch.combined, scratch.turn)
+            cofactors(combined, scratch.turn)
             touched = scratch.touched[part] == 1
             if touched:
-                sum_normals(scratch.moved, surface, part)
+                sum_normals(moved, surface, part)
             write_normals(surface, touched, part, scratch.turn, start, normals[frame, start:stop])
 
 
 @compiled
 def points_of_frames(
-    values: Float64,
-    rest: Float64,
-    owner: Int64,
-    shifts: Shifts,
-    transforms: Transforms,
-    with_head: bool,
-    out: Float64,
+    values: Float64, poses: Float64, rest: Float64, owner: Int64, shifts: Shifts, out: Float64
 ) -> None:
-    """Write points for FAPs (T, 68) to `out` (T, N, 3). owner: (N,) whose transforms they follow, or -1."""
-    head = len(transforms.start) - 2
-    poses = np.empty((head + 1, 3, 4))
-    touched = np.zeros(head, dtype=np.int64)
-    moved = np.empty_like(rest)
+    """Write points for FAPs (T, 68) to `out` (T, N, 3).
+
+    poses: (T, P + 1, 3, 4) as of `poses_of_frames`. owner: (N,) which of them points follow, or -1 for none.
+    """
+    touched = np.zeros(poses.shape[1], dtype=np.int64)
     for frame in range(len(values)):
-        copy(rest, moved)
-        add_shifts(values[frame], shifts, moved, touched)
-        compose(values[frame], transforms, poses)
+        moved = out[frame]
         for point in range(len(rest)):
-            own = out[frame, point : point + 1]
-            copy(moved[point], own)
+            for axis in range(3):
+                moved[point, axis] = rest[point, axis]
+        add_shifts(values[frame], shifts, moved, touched)
+        for point in range(len(rest)):
             if owner[point] >= 0:
-                transform_points(poses[owner[point]], own, own)
-            if with_head:
-                transform_points(poses[head], own, own)
+                own = moved[point : point + 1]
+                transform_points(poses[frame, owner[point]], own, own)

@@ -56,13 +56,13 @@ class DisplacementMeter:
         self.model = model
         self._deformer = Deformer(model)
         self._loops = loops
-        self._scratch = loops.allocate_scratch(len(model.vertices), len(model.parts))
+        self._scratch = loops.allocate_scratch(len(model.vertices))
         self._movable: int | None = None
 
     @property
     def shifts(self) -> Shifts:
         """The model's tables of shifts."""
-        return self._deformer._tables.shifts
+        return self._deformer._tables.mesh.shifts
 
     @property
     def transforms(self) -> Transforms:
@@ -79,8 +79,10 @@ class DisplacementMeter:
         for start in range(0, len(different), FRAMES_PER_CALL):
             frames = different[start : start + FRAMES_PER_CALL]
             own_largest, own_worst = np.zeros(len(frames)), np.zeros(len(frames), dtype=np.int64)
+            pair = np.stack([first[frames], second[frames]])
+            poses = np.stack([self._deformer._poses(values) for values in pair])
             self._loops.measure_frames(
-                first[frames], second[frames], tables, self._scratch, (own_largest, own_worst),
+                pair, poses, tables.mesh, self._scratch, (own_largest, own_worst),
                 MAX_DISTANCE / BINS, counts,
             )  # fmt: skip
             largest[frames], worst[frames] = own_largest, own_worst
@@ -92,10 +94,10 @@ class DisplacementMeter:
         if self._movable is None:
             model, tables = self._deformer.model, self._deformer._tables
             movable = np.zeros(len(model.vertices), dtype=np.bool_)
-            movable[tables.shifts.rows] = True
+            movable[tables.mesh.shifts.rows] = True
             for part in range(len(model.parts)):
                 if tables.transforms.start[part] < tables.transforms.start[part + 1]:
-                    movable[tables.part_start[part] : tables.part_start[part + 1]] = True
+                    movable[tables.mesh.part_start[part] : tables.mesh.part_start[part + 1]] = True
             self._movable = int(movable.sum())
         return self._movable
 

@@ -69,16 +69,22 @@ class Transforms(NamedTuple):
     """(K, 3) metres."""
 
 
-class FlatModel(NamedTuple):
-    """A model's vertices, and its tables as flat arrays, for the compiled loops."""
+class MovingMesh(NamedTuple):
+    """A model's vertices and what moves them, for the compiled loops."""
 
     rest: Float32
     """(V, 3) neutral vertices."""
     part_start: Int64
     """(P + 1,) first vertex of each part, and the number of all."""
     shifts: Shifts
-    transforms: Transforms
     surface: Surface
+
+
+class FlatModel(NamedTuple):
+    """A model's tables as flat arrays."""
+
+    mesh: MovingMesh
+    transforms: Transforms
     point_shifts: Shifts
     """The shifts of feature points that are bound to vertices."""
     owner: Int64

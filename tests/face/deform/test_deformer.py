@@ -354,12 +354,12 @@ def test_points_that_the_face_lacks_stay_unknown() -> None:
 def test_deformers_of_one_model_share_its_tables_but_write_to_arrays_of_their_own() -> None:
     model = face(sheet(), tables=(FaceDefTables(3, (EXAMPLE,)),))
     one, other = (Deformer(model)._tables for _ in range(2))
-    assert one.shifts.slopes is other.shifts.slopes
-    assert one.surface.corners is other.surface.corners
-    assert not np.shares_memory(one.shifts.amount, other.shifts.amount)
+    assert one.mesh.shifts.slopes is other.mesh.shifts.slopes
+    assert one.mesh.surface.corners is other.mesh.surface.corners
+    assert not np.shares_memory(one.mesh.shifts.amount, other.mesh.shifts.amount)
     assert not np.shares_memory(one.point_shifts.amount, other.point_shifts.amount)
-    assert not np.shares_memory(one.surface.sums, other.surface.sums)
-    assert not np.shares_memory(one.surface.units, other.surface.units)
+    assert not np.shares_memory(one.mesh.surface.sums, other.mesh.surface.sums)
+    assert not np.shares_memory(one.mesh.surface.units, other.mesh.surface.units)
     seen = weakref.ref(model)
     del model
     gc.collect()
