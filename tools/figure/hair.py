@@ -164,10 +164,16 @@ def shortness(p: Float64) -> Float64:
 def _curl_tone(p: Float64) -> Float64:
     """Return (N,) as `strand_tone` for curls: strands that wind, bright upon dark."""
     q = RADIUS * unit(p - MIDDLE)
-    # Strands follow the contours of a smooth random field: nested loops, as wide as a curl.
-    field = noise(q, CURL, 83, 3) + 0.35 * noise(q, CURL / 2, 84, 3)
-    coils = 0.40 * np.sin(15 * field) + 0.34 * np.sin(37 * field + 2 * noise(q, CURL / 3, 85))
-    return coils + 0.30 * noise(q, 0.0005, 86) + 0.25 * noise(q, 1.6 * CURL, 87) + 0.05
+    fine = 0.34 * noise(q, 0.0004, 86) + 0.22 * noise(q, 0.0009, 89)
+    # Strands follow the contours of smooth random fields, loops as wide as a curl; curls lie upon curls.
+    tone, warp = np.zeros(len(p)), 0.0009 * np.stack([noise(q, 0.0028, 90 + k) for k in range(3)], axis=1)
+    for layer, seed in enumerate((83, 84, 85)):
+        field = noise(q + warp * (layer - 1) + 0.013 * layer, CURL * (1.15 - 0.2 * layer), seed, 3)
+        coils = 0.42 * np.sin(13 * field + 5 * fine) + 0.20 * np.sin(31 * field)
+        place = noise(q, CURL * 0.75, 93 + layer) - 0.02 if layer else np.ones(len(p))
+        cover = smoothstep(place / 0.16)
+        tone = (1 - cover) * (tone - 0.45 * smoothstep((place + 0.30) / 0.30) * (layer > 0)) + cover * coils
+    return tone + fine + 0.22 * noise(q, 1.6 * CURL, 87) + 0.14
 
 
 def strand_reach(p: Float64, hair: Hair) -> Float64:
