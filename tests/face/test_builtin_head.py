@@ -50,6 +50,8 @@ def test_its_origin_and_licence_are_told(head: FaceModel) -> None:
 
 def test_the_built_in_head_is_symmetric(head: FaceModel) -> None:
     for part in head.parts:
+        if part.kind == "hair":  # combed from a parting on one side
+            continue
         name = part.name.replace("left", "#").replace("right", "left").replace("#", "right")
         other = head.part(name).vertices
         away, _ = cKDTree(other).query(part.vertices * np.array([-1, 1, 1], dtype=np.float32))

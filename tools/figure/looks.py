@@ -15,20 +15,21 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Hair:
-    """Hair of the head, a layer over the scalp that is painted with strokes.
+    """Hair of the head: a layer over the scalp, painted with strands, and locks that stand out from it.
 
-    sides, top: its thickness at the sides and what the top adds, metres. rise: metres from the hairline over
-    which it reaches them. lumps: how far locks stand out, metres. curly: whether strokes lie in all
-    directions, else they are combed from a parting. stroke: shortest and longest stroke, metres. colours: of
-    the strokes, sRGB, 0..255, the first also of the layer below.
+    sides, top: thickness of the layer at the sides and what the top adds, metres. volumes: what each place of
+    `hair.VOLUMES` adds, metres. rise: metres from the hairline over which it reaches that. lumps: how far it
+    is uneven, metres. loose: how far locks stand out, relative to the first figure's. curly: whether strands
+    coil, else they are combed from a parting. colours: of strands from dark to bright, sRGB, 0..255.
     """
 
     sides: float
     top: float
+    volumes: tuple[float, float, float]
     rise: float
     lumps: float
+    loose: float
     curly: bool
-    stroke: tuple[float, float]
     colours: tuple[Colour, ...]
 
 
@@ -64,8 +65,8 @@ class Looks:
 ALEX = Looks(
     name="alex",
     hair=Hair(
-        0.0035, 0.0100, 0.020, 0.0011, curly=False, stroke=(0.006, 0.013),
-        colours=((54, 39, 30), (82, 59, 43), (112, 82, 60), (36, 26, 21)),
+        0.0035, 0.0100, (-0.006, 0.004, 0.001), 0.020, 0.0011, 1.0, curly=False,
+        colours=((30, 21, 17), (54, 38, 29), (84, 60, 44), (122, 90, 66)),
     ),
     skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
     waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(184, 104, 96), lip_line=(132, 62, 58),
@@ -75,8 +76,8 @@ ALEX = Looks(
 RUTH = Looks(
     name="ruth",
     hair=Hair(
-        0.017, 0.009, 0.020, 0.0022, curly=True, stroke=(0.0022, 0.0045),
-        colours=((98, 94, 92), (150, 147, 145), (190, 188, 186), (62, 58, 57)),
+        0.014, 0.009, (-0.006, 0.003, 0.000), 0.032, 0.0022, 1.3, curly=True,
+        colours=((52, 48, 47), (88, 84, 82), (136, 133, 131), (184, 182, 180)),
     ),
     skin=(128, 86, 66), blush=(132, 76, 62), socket=(94, 60, 48), neck=(120, 80, 61),
     waterline=(150, 98, 86), caruncle=(186, 118, 108), lip=(128, 70, 64), lip_line=(78, 40, 36),

@@ -44,6 +44,9 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
     skin_tint = linear(looks.neck) / linear(ALEX.neck)
     tints = {"shirt": looks.shirt, "trousers": looks.trousers, "shoes": looks.shoes}
     tints |= {"skin": skin_tint, "neck": skin_tint}
+    tints["hair"] = np.mean([linear(c) for c in looks.hair.colours], axis=0) / np.mean(
+        [linear(c) for c in ALEX.hair.colours], axis=0
+    )
     plain = np.ones(3)
     return {
         "face": np.array(shape_key(head.parts)),

@@ -15,6 +15,7 @@ import eyeballs
 import garment
 import landmarks
 import lashes
+import locks
 import make_levels
 import mouth
 import numpy as np
@@ -22,7 +23,7 @@ import paint
 import sculpt
 from hair import grow, scalp
 from looks import ALEX, Looks, reshape
-from meshes import Mesh, mirror, unique_edges
+from meshes import Mesh, join, mirror, unique_edges
 from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
 from subdivide import Refined, refine
 
@@ -94,9 +95,9 @@ def make_inner_parts(looks: Looks) -> tuple[dict[str, Mesh], dict[str, int]]:
 
 KINDS = {
     "eye_left": "eye", "eye_right": "eye", "teeth_upper": "teeth", "teeth_lower": "teeth", "tongue": "tongue",
-    "lashes_left": "lash", "lashes_right": "lash", "shirt": "other",
+    "lashes_left": "lash", "lashes_right": "lash", "shirt": "other", "hair": "hair",
 }  # fmt: skip
-ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.6, "lash": 0.65, "other": 0.95}
+ROUGHNESS = {"eye": 0.1, "teeth": 0.25, "tongue": 0.6, "lash": 0.65, "hair": 0.65, "other": 0.95}
 
 
 def parts_and_points(looks: Looks = ALEX, *, painted: bool = True) -> tuple[tuple[Part, ...], Float64, Int32]:
@@ -110,6 +111,8 @@ def parts_and_points(looks: Looks = ALEX, *, painted: bool = True) -> tuple[tupl
     meshes |= _lashes(surface, marks)
     vertices, triangles, colours = garment.make_shirt(ORIGIN)
     meshes["shirt"] = vertices, triangles, colours * (*looks.shirt, 1.0)
+    grown = grow(surface.vertices, looks.hair)
+    meshes["hair"] = locks.locks(surface.vertices, grown, surface.triangles, looks.hair)
     for name, (vertices, triangles, colours) in meshes.items():
         material = Material(KINDS[name], (1.0, 1.0, 1.0), ROUGHNESS[KINDS[name]])
         placed = _reshape_part(looks, name, vertices)
@@ -191,7 +194,7 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     oily = oily * smoothstep((z + 0.01) / 0.02) * smoothstep((y + 0.05) / 0.03)
     gloss = 0.38 + 0.06 * oily + 0.10 * lips + 0.14 * wet + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
-    colours[:, 3] = gloss * (1 - cropped) + 0.16 * cropped
+    colours[:, 3] = gloss * (1 - cropped) + 0.04 * cropped
     inside = near & (ring < 0)
     depth = np.maximum(smoothstep((-0.012 - z) / 0.055), 0.8 * smoothstep((-ring - 0.5) / 3.5)) * inside
     colours[:, :3] *= 1 - depth[:, None] * (0.68, 0.78, 0.78)
@@ -214,14 +217,17 @@ def _nostrils(surface: Refined) -> Float64:
 
 
 def _lashes(surface: Refined, marks: sculpt.Marks) -> dict[str, Mesh]:
-    """Return lashes along the outer edge of each upper lid's margin."""
+    """Return lashes along the outer edge of each lid's margin."""
     v = surface.vertices
     edge = (np.abs(marks.eye - sculpt.MARGIN_RING - 1) < 1e-6) & (v[:, 0] > 0)
     inner, outer = v[edge, 0].argmin(), v[edge, 0].argmax()
     corners = v[edge][[inner, outer]]
     line = np.interp(v[:, 0], corners[:, 0], corners[:, 1])
-    upper = edge & (v[:, 1] >= line)
-    mesh = lashes.lashes(v[upper][np.argsort(v[upper, 0])], EYE_CENTRE - ORIGIN)
+    rows = []
+    for lid, row in ((v[:, 1] >= line, lashes.UPPER), (v[:, 1] <= line, lashes.LOWER)):
+        margin = v[edge & lid]
+        rows.append(lashes.lashes(margin[np.argsort(margin[:, 0])], EYE_CENTRE - ORIGIN, row))
+    mesh = join(rows)
     return {"lashes_left": mesh, "lashes_right": mirror(mesh)}
 
 

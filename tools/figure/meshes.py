@@ -58,3 +58,13 @@ def average_with_neighbours(rows: Float64, edges: Int64) -> Float64:
         np.add.at(total, a, rows[b])
         np.add.at(count, a, 1)
     return total / count
+
+
+def blade_triangles(segments: int) -> Int64:
+    """Return triangles of a strip that ends in a point: pairs of vertices along it, one at its tip."""
+    triangles = []
+    for k in range(segments - 1):
+        a, b, c, d = 2 * k, 2 * k + 1, 2 * k + 2, 2 * k + 3
+        triangles += [[a, b, d], [a, d, c]]
+    last = 2 * (segments - 1)
+    return np.array([*triangles, [last, last + 1, last + 2]])

@@ -6,8 +6,8 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
-from hair import AXIS, combed, in_parting, noise, scalp
-from looks import ALEX, Hair, Looks
+from hair import TONES, height_above_hairline, in_parting, noise, shortness, strand_reach, strand_tone
+from looks import ALEX, Looks
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
@@ -21,14 +21,10 @@ MOUTH = np.array([96, 34, 34.0])
 """sRGB, 0..255."""
 HAIR_WIDTH = 0.00023
 """Metres."""
-STROKES = 190000
-"""Of the head's hair."""
-SOFT_EDGE = 0.019
-"""Metres over which it thins out at the hairline."""
-EDGE_LENGTH = 0.55
-"""Length of the hairs at its thin end, as a share of those on the scalp."""
 BROW_STROKES = ((1600, 0.0), (700, 0.25))
 """Of both brows: how many hairs, and how far their colour is towards that of the skin."""
+SPARSEST = 0.10
+"""Density of a brow below which no hair grows: none stands apart."""
 TAPER = ((1.0, 110), (0.7, 190), (0.4, 255))
 """Shares of a brow's hair from its root, and how opaque they are, 0..255: it ends in a point."""
 BROW = np.array([
@@ -103,13 +99,7 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     colour = _lines(colour, p, looks)
     colour = _eyes(colour, p, ring_eye, looks)
     colour = _mouth(colour, p, ring_mouth, lip_side, looks)
-    hair = scalp(_ragged(p), SOFT_EDGE)
-    speckle = 0.5 + 0.5 * noise(p, 0.0009, 31)
-    cover = smoothstep(hair * 1.45 - 0.45 - 0.55 * speckle * (1 - hair))
-    parting = np.zeros(len(p)) if looks.hair.curly else in_parting(p)
-    below = _blend(np.tile(looks.hair.colours[0], (len(p), 1)), np.array(looks.scalp), parting)
-    below = below * ((0.86 + 0.28 * speckle) * (1 + 0.3 * _locks(p, looks.hair)))[:, None]
-    colour = _blend(colour, below, 0.9 * cover)
+    colour = _hair(colour, p, looks)
     colour = _blend(colour, np.array(looks.brow), 0.22 * brow(p, looks.brow_height)[1])
     image = np.zeros((*chart.known.shape, 3))
     image[chart.known] = colour
@@ -120,7 +110,26 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     return Image.fromarray(filled.astype(np.uint8))
 
 
-def encode_jpeg(picture: Image.Image, quality: int = 88) -> bytes:
+def _hair(colour: Float64, p: Float64, looks: Looks) -> Float64:
+    """Return the colour with the hair of the head: strands that thin out towards their tips."""
+    above = height_above_hairline(p)
+    near = above > -0.02
+    p, above, hair = p[near], above[near], looks.hair
+    shadow = smoothstep((above + 0.010) / 0.016) * 0.55
+    cover = smoothstep((above + strand_reach(p, hair)) / 0.0022)
+    tone = strand_tone(p, hair)
+    strands = np.stack([np.interp(tone, TONES, [c[k] for c in hair.colours]) for k in range(3)], axis=1)
+    # Through short hair skin is seen, in grains.
+    cover *= 1 - shortness(p) * (0.50 + 0.35 * noise(p, 0.0007, 69))
+    if not hair.curly:
+        parting = in_parting(p)
+        strands = _blend(strands * (1 - 0.35 * parting)[:, None], np.array(looks.scalp), 0.55 * parting)
+    below = _blend(colour[near], np.array(looks.scalp), shadow)
+    colour[near] = _blend(below, strands, cover)
+    return colour
+
+
+def encode_jpeg(picture: Image.Image, quality: int = 86) -> bytes:
     """Return the picture as a JPEG file."""
     buffer = io.BytesIO()
     picture.save(buffer, "JPEG", quality=quality, optimize=True, subsampling=0)
@@ -242,34 +251,17 @@ def _fill_unknown(image: Float64, known: Bool) -> Float64:
 
 
 def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
-    """Draw single hairs onto the picture: those of the head, and those of the brows."""
+    """Draw the single hairs of the brows onto the picture."""
     random = np.random.default_rng(17)
-    hair = looks.hair
     step_x = np.gradient(chart.positions_at, axis=1)
     step_y = np.gradient(chart.positions_at, axis=0)
     area = np.linalg.norm(np.cross(step_x, step_y), axis=2)
     solid = chart.known & (area < 1e-6) & (area > 1e-12)
     rows, columns = np.nonzero(solid)
     p = chart.positions_at[rows, columns]
-    dense = scalp(_ragged(p), SOFT_EDGE)
-    weight = area[rows, columns] * dense**1.5
-    weight *= 1.0 if hair.curly else 1 - 0.9 * in_parting(p)
-    locks = _locks(p, hair)
     layers = []
-    tones = np.mean(hair.colours, axis=1)
-    for colour, tone in zip(hair.colours, tones - tones.mean(), strict=True):
-        # Pale hairs lie upon the locks, dark ones between them.
-        here = weight * np.clip(1 + 1.2 * locks * np.sign(tone), 0.1, 2)
-        chosen = random.choice(len(p), STROKES // len(hair.colours), p=here / here.sum())
-        way = random.normal(0, 1, (len(chosen), 3)) if hair.curly else combed(p[chosen])
-        way = _unit(way) + random.normal(0, 0.0 if hair.curly else 0.12, way.shape)
-        length = EDGE_LENGTH + (1 - EDGE_LENGTH) * dense[chosen, None]
-        direction = _unit(way) * random.uniform(*hair.stroke, (len(chosen), 1)) * length
-        other, back = _across_the_seam(p, chosen, direction)
-        drawn = np.concatenate([chosen, other]), np.concatenate([direction, back])
-        layers.append((*drawn, colour, 0.75, ((1.0, 255),)))
     along, density = brow(p, looks.brow_height)
-    weight = area[rows, columns] * density
+    weight = area[rows, columns] * np.where(density > SPARSEST, density, 0.0)
     for count, pale in BROW_STROKES:
         chosen = random.choice(len(p), count, p=weight / weight.sum())
         colour = np.array(looks.brow) * (1 - pale) + np.array(looks.skin) * pale
@@ -291,41 +283,6 @@ def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
         blurred = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
         faded = blurred.point(lambda value, s=strength: int(value * s))
         picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in colour)), (0, 0), faded)
-
-
-def _ragged(p: Float64) -> Float64:
-    """Return points (N, 3) shifted up and down, so that a hairline found there is uneven."""
-    shift = 0.0045 * noise(p, 0.011, 51) + 0.0022 * noise(p, 0.0032, 52)
-    return p + shift[:, None] * (0.0, 1.0, 0.0)
-
-
-def _locks(p: Float64, hair: Hair) -> Float64:
-    """Return (N,) -1..1 how far locks of hair stand out: stripes the way in which the hair is combed."""
-    if hair.curly:
-        return noise(p, 0.006, 61)
-    over = smoothstep((p[:, 1] - 0.045) / 0.045)
-    across = noise(p * (0.18, 1.0, 1.0), 0.0045, 61) * 0.6 + noise(p * (0.12, 1.0, 1.0), 0.0022, 62) * 0.4
-    down = noise(p * (1.0, 0.15, 1.0), 0.0045, 63) * 0.6 + noise(p * (1.0, 0.12, 1.0), 0.0022, 64) * 0.4
-    return over * across + (1 - over) * down
-
-
-def _across_the_seam(p: Float64, chosen: Integer, direction: Float64) -> tuple[Integer, Float64]:
-    """Return texels (M,) and directions (M, 3) of the hairs that cross the middle of the back of the head.
-
-    There the texture has its seam, so that such a hair is drawn on both of its sides: at each end anew.
-    """
-    root = p[chosen]
-    found = []
-    for side in (1, -1):
-        tip = root + direction * (0.5 * side)
-        crosses = np.flatnonzero((root[:, 0] * tip[:, 0] < 0) & (root[:, 2] < AXIS))
-        for sign in (1, -1):
-            there = np.flatnonzero((p[:, 0] * sign > 0) & (np.abs(p[:, 0]) < 0.006) & (p[:, 2] < AXIS))
-            of = crosses[tip[crosses, 0] * sign > 0]
-            _, nearest = cKDTree(p[there]).query(tip[of])
-            found.append((there[nearest], direction[of]))
-    texels, directions = zip(*found, strict=True)
-    return np.concatenate(texels), np.concatenate(directions)
 
 
 def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Float64:

@@ -50,8 +50,10 @@ DEPTH_SIDE = 700
 """Pixels of the longer side of the picture of depths."""
 TONES = 128
 """Width and height of the grid on which tones are compared."""
-HAIR = 0.055
-"""Linear luminance of the built-in skin below which it is hair."""
+HAIR = 0.085
+"""Linear luminance of the built-in skin, without its finest detail, below which it is hair."""
+STRANDS = 2.5
+"""Texels over which that luminance is blurred: bright strands are hair, too."""
 BROW_MARGIN = 0.006
 """Metres above the brows, and behind their ends, from which dark places are hair of the skull."""
 BALD_EDGE = 6
@@ -92,7 +94,7 @@ def paint(
         np.asarray(part.texcoords, dtype=np.float64),
     )
     corner = _triangle_map(surface.texcoords[surface.triangles] * SIZE - 0.5, (SIZE, SIZE))
-    own = _own_skin(part, surface, corner)
+    own = plain = _own_skin(part, surface, corner)
     skin = np.ones((SIZE, SIZE), dtype=np.float32)
     if not hair:
         own, skin = _without_hair(own, model, surface, corner)
@@ -112,9 +114,11 @@ def paint(
     pixels = np.round(_to_srgb(result) * 255).astype(np.uint8)
     face = _face_texels(model, surface, corner)
     seen = float((shown[face] > 0.5).mean()) if face.any() else 0.0
-    return replace(
-        model, parts=tuple(_with_texture(one, pixels) if one is part else one for one in model.parts)
-    ), seen
+    parts = []
+    for one in model.parts:
+        changed = _with_locks(one, plain, result, hair=hair) if one.kind == "hair" else one
+        parts.append(_with_texture(one, pixels) if one is part else changed)
+    return replace(model, parts=tuple(parts)), seen
 
 
 class _Layer:
@@ -275,7 +279,7 @@ def _without_hair(
     temples = float(model.points[[point_rows()["4.5"], point_rows()["4.6"]], 2].min())
     middle = surface.vertices[surface.triangles].mean(axis=1)
     skull = (middle[:, 1] > brows + BROW_MARGIN) | (middle[:, 2] < temples - BROW_MARGIN)
-    dark = own @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32) < HAIR
+    dark = _is_hair(own)
     gone = dark & skull[np.maximum(corner, 0)] & (corner >= 0)
     gone = binary_dilation(gone, iterations=BALD_EDGE)
     known = (~gone & ~dark & (corner >= 0)).astype(np.float32)
@@ -288,12 +292,30 @@ def _without_hair(
     return bald.astype(np.float32), 1 - weight[..., 0]
 
 
+def _is_hair(own: Float32) -> Bool:
+    """Return the mask (SIZE, SIZE) of texels of the head's own skin that are dark as hair."""
+    return np.asarray(
+        gaussian_filter(own @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32), STRANDS) < HAIR
+    )
+
+
+def _with_locks(part: Part, own: Float32, shown: Float32, *, hair: bool) -> Part:
+    """Return a part of single hairs in the tone that the hair painted on the skin has got, or invisible."""
+    if part.colours is None or not hair:
+        return replace(part, material=replace(part.material, alpha="blend", opacity=0.0))
+    where = _is_hair(own)
+    tint = shown[where].mean(axis=0) / np.maximum(own[where].mean(axis=0), 1e-4) if where.any() else 1.0
+    colours = part.colours.copy()
+    colours[:, :3] = np.clip(colours[:, :3] * tint, 0.0, 1.0)
+    return replace(part, colours=colours)
+
+
 def _even(below: Float32, above: Float32, weight: Float32, own: Float32) -> Float32:
     """Return the picture below in the tone of the one above, so that no seam shows where they meet.
 
     The ratio of their tones, known where both are, goes on smoothly elsewhere; of skin and hair for each.
     """
-    hair = own @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32) < HAIR
+    hair = _is_hair(own)
     result = below.copy()
     for kind in (hair, ~hair):
         share = _shrink(weight * kind)

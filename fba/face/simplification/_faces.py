@@ -21,7 +21,7 @@ from fba.face.checks._posing import Poser
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
 from fba.face.importers.assembly._repair import repair_tables, take_sounder
-from fba.face.model import DetailLevel, FaceModel, shape_key
+from fba.face.model import DetailLevel, FaceModel, Part, shape_key
 from fba.face.simplification._tables import close_lids, find_balls, find_lines, fit_tables
 from fba.mesh.simplify import (
     Level,
@@ -61,6 +61,10 @@ TEETH_SHARE = 0.3
 """The same for teeth, which stand out against the dark behind them."""
 TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""
+LOCK_TRIANGLES = 16
+"""Hair of pieces with fewer triangles than this, on average, is locks that lie upon other hair."""
+LOCK_COST = 1e-4
+"""Importance of such locks: they go first, each as a whole, as the hair below them stays."""
 OTHER_SHARE = 0.2
 """The same for hair, clothes and what else is worn."""
 RIM_VERTICES = 16
@@ -222,6 +226,17 @@ def _find_pinned(model: FaceModel) -> Bool:
     return pinned
 
 
+def _count_pieces(part: Part) -> int:
+    """Return the number of connected pieces of a part."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    size = len(part.vertices)
+    rows, columns = part.triangles.ravel(), np.roll(part.triangles, 1, axis=1).ravel()
+    joined = coo_array((np.ones(len(rows)), (rows, columns)), shape=(size, size))
+    return int(connected_components(joined, directed=False, return_labels=False))
+
+
 def _importance(model: FaceModel) -> Float64:
     """Return (V,): factors of the cost, by how much of a FAP's motion reaches each vertex of the skin."""
     share = np.zeros(len(model.vertices))
@@ -245,4 +260,9 @@ def _importance(model: FaceModel) -> Float64:
         for part in model.of_kind(kind):
             start = model.starts[part.name]
             share[start : start + len(part.vertices)] = counts
-    return 1.0 + IMPORTANCE * share**2
+    importance = 1.0 + IMPORTANCE * share**2
+    for part in model.of_kind("hair"):
+        if len(part.triangles) <= LOCK_TRIANGLES * _count_pieces(part):
+            start = model.starts[part.name]
+            importance[start : start + len(part.vertices)] = LOCK_COST
+    return importance

@@ -16,7 +16,7 @@ from fba.compiled import is_compiled
 from fba.face import Deformer, FaceModel
 from fba.parameters import point_rows
 from fba_player._figure._closing_lines import closing_vertices
-from fba_player._figure._face_parts import join_pieces, part_rows
+from fba_player._figure._face_parts import find_hairs, join_pieces, part_rows
 from fba_player._figure.baked_shapes import load_baked, pack, unpack
 from fba_player._figure.occlusion import CACHE_VERSION, HARMONICS, Visibility, bake, weights
 
@@ -181,7 +181,11 @@ class FaceLight:
 
     def bake(self) -> Baked:
         """Compute `baked`."""
-        solid = [part for part in self._model.parts if part.kind not in ("brow", "lash")]
+        solid = [
+            part
+            for part in self._model.parts
+            if part.kind not in ("brow", "lash") and (part.kind != "hair" or find_hairs(part) is None)
+        ]
         joined = [part.triangles + self._model.starts[part.name] for part in solid]
         triangles = np.ascontiguousarray(np.concatenate(joined), dtype=np.int32)
         faps = np.zeros(68, dtype=np.float32)

@@ -1,0 +1,125 @@
+"""Locks that stand out from the layer of hair: narrow strips that hide its edge and break its outline."""
+
+from __future__ import annotations
+
+import numpy as np
+from hair import MIDDLE, RADIUS, TONES, height_above_hairline, noise, strand_places, strand_points
+from looks import ALEX, Hair
+from meshes import Mesh, blade_triangles, join
+
+from fba.arrays import Float64, Integer
+from fba.rotations import unit
+
+SEGMENTS = 3
+GLOSS = 0.3
+GROUPS = (
+    # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
+    ("fringe", 180, (0.000, 0.014), (0.011, 0.021), 0.00058, 0.0020),
+    ("edge", 130, (-0.001, 0.009), (0.006, 0.012), 0.00042, 0.0010),
+    ("crown", 110, (0.012, 1.0), (0.014, 0.026), 0.00062, 0.0032),
+)
+SWEEP = -0.45
+"""Radians by which the fringe turns, to the subject's right."""
+NEIGHBOURS = 8
+"""Vertices between which the depth of the layer is interpolated."""
+
+
+def locks(bare: Float64, grown: Float64, triangles: Integer, hair: Hair) -> Mesh:
+    """Return the locks of a figure, one connected piece each; equally many of each figure, at the same roots.
+
+    bare, grown: (V, 3), the skin without and with its layer of hair. triangles: (F, 3). Colours are those of
+    the first figure.
+    """
+    depth, blades, colours = _Depth(bare, grown), [], []
+    for seed, (name, count, heights, lengths, width, lift) in enumerate(GROUPS):
+        random = np.random.default_rng(91 + seed)
+        roots = _roots(bare, triangles, name, heights, count, random)
+        length = random.uniform(*lengths, count)
+        bend = random.normal(0.0, 0.10, count) + 0.30 * noise(roots, 0.012, 92)  # neighbours alike
+        bend += SWEEP if name == "fringe" else 0.0
+        if hair.curly:
+            bend, length = np.sign(bend) * random.uniform(1.0, 2.6, count), length * 0.62
+        paths = _paths(roots, length, bend, lift * random.uniform(0.3, 1.3, count) * hair.loose, depth)
+        blades += [_blade(path, width * random.uniform(0.6, 1.3)) for path in paths]
+        colours += list(_colours(random.normal(0.25, 0.40, count)))
+    pattern = blade_triangles(SEGMENTS)
+    return join([(b, pattern, np.tile(c, (len(b), 1))) for b, c in zip(blades, colours, strict=True)])
+
+
+class _Depth:
+    """How far the layer of hair is from `MIDDLE`, by direction."""
+
+    def __init__(self, bare: Float64, grown: Float64) -> None:
+        from scipy.spatial import cKDTree
+
+        near = height_above_hairline(bare) > -0.03
+        away = grown[near] - MIDDLE
+        self._radius = np.linalg.norm(away, axis=1)
+        self._tree = cKDTree(away / self._radius[:, None])
+
+    def __call__(self, directions: Float64) -> Float64:
+        """Return (N,) metres for directions (N, 3)."""
+        apart, nearest = self._tree.query(unit(directions), k=NEIGHBOURS)
+        share = 1 / (apart + 0.003) ** 2
+        return (self._radius[nearest] * share).sum(axis=1) / share.sum(axis=1)
+
+
+def _roots(
+    bare: Float64,
+    triangles: Integer,
+    group: str,
+    heights: tuple[float, float],
+    count: int,
+    random: np.random.Generator,
+) -> Float64:
+    """Return (count, 3) points of the bare scalp, evenly spread over the places of a group.
+
+    heights: above the hairline, metres. The fringe is in front, the edge is the rest of the hairline.
+    """
+    corners = bare[triangles]
+    middle = corners.mean(axis=1)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    if group != "crown":
+        area = area * (np.abs(height_above_hairline(middle)) < 0.03)
+    chosen = random.choice(len(triangles), 60 * count, p=area / area.sum())
+    shares = random.dirichlet(np.ones(3), len(chosen))
+    points = np.einsum("nk,nkd->nd", shares, corners[chosen])
+    above = height_above_hairline(points)
+    front = (points[:, 2] > -0.055) & (points[:, 1] > 0.035)
+    fits = (above > heights[0]) & (above < heights[1])
+    if group != "crown":
+        fits &= front == (group == "fringe")
+    return points[fits][:count]
+
+
+def _paths(roots: Float64, length: Float64, bend: Float64, lift: Float64, depth: _Depth) -> Float64:
+    """Return (N, SEGMENTS + 1, 3) points along locks that lie as the strands below them, or bend aside."""
+    places = strand_places(roots)
+    start = strand_points(places)
+    along = unit(strand_points(places + 0.01) - start)
+    aside = np.cross(start, along)
+    paths = []
+    for share in np.linspace(0, 1, SEGMENTS + 1):
+        turn = bend * share
+        ahead = length * share * np.sinc(turn / np.pi)
+        off = length * share * np.sinc(turn / 2 / np.pi) * np.sin(turn / 2)
+        q = unit(start * RADIUS + along * ahead[:, None] + aside * off[:, None])
+        paths.append(MIDDLE + q * (depth(q) - 0.0006 + (lift + 0.0006) * share**1.4)[:, None])
+    return np.stack(paths, axis=1)
+
+
+def _blade(path: Float64, width: float) -> Float64:
+    """Return vertices of a strip along a path (N, 3): pairs, and one at its tip."""
+    points = []
+    forward = np.gradient(path, axis=0)
+    side = unit(np.cross(forward, path - MIDDLE))
+    for k, share in enumerate(np.linspace(0, 1, len(path))[:-1]):
+        half = side[k] * width / 2 * (0.7 + 0.9 * share - 1.3 * share**2)
+        points += [path[k] - half, path[k] + half]
+    return np.array([*points, path[-1]])
+
+
+def _colours(tones: Float64) -> Float64:
+    """Return (N, 4) linear light and gloss of locks; tones: as of `hair.strand_tone`."""
+    shown = np.stack([np.interp(tones, TONES, [c[k] for c in ALEX.hair.colours]) for k in range(3)], axis=1)
+    return np.concatenate([(shown / 255) ** 2.2, np.full((len(tones), 1), GLOSS)], axis=1)
