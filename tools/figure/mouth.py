@@ -18,7 +18,7 @@ TONGUE = np.array([0.60, 0.195, 0.18])
 TONGUE_UNDER = np.array([0.44, 0.13, 0.125])
 HALF_WIDTH, DEPTH = 0.0285, 0.0420
 """Half axes of the outer edge of the upper arch of teeth, half an oval, metres."""
-UPPER_POWER, LOWER_POWER = 2.55, 2.3
+UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
