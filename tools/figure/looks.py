@@ -69,7 +69,7 @@ ALEX = Looks(
         colours=((30, 21, 17), (54, 38, 29), (84, 60, 44), (122, 90, 66)),
     ),
     skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
-    waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(184, 104, 96), lip_line=(132, 62, 58),
+    waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(190, 116, 105), lip_line=(146, 78, 71),
     freckle=(178, 118, 92), scalp=(112, 86, 73), brow=(52, 38, 30),
 )  # fmt: skip
 """The built-in person: a young man with brown hair."""
@@ -80,7 +80,7 @@ RUTH = Looks(
         colours=((52, 48, 47), (88, 84, 82), (136, 133, 131), (184, 182, 180)),
     ),
     skin=(128, 86, 66), blush=(132, 76, 62), socket=(94, 60, 48), neck=(120, 80, 61),
-    waterline=(150, 98, 86), caruncle=(186, 118, 108), lip=(128, 70, 64), lip_line=(78, 40, 36),
+    waterline=(150, 98, 86), caruncle=(186, 118, 108), lip=(132, 78, 69), lip_line=(84, 45, 40),
     freckle=(92, 58, 42), scalp=(84, 66, 58), brow=(66, 56, 52), brow_height=0.72, lines=1.0,
     iris=((0.080, 0.040, 0.018), (0.038, 0.021, 0.012)),
     shirt=(3.0, 0.62, 0.45), trousers=(1.1, 0.75, 0.60), shoes=(0.8, 0.55, 0.45),

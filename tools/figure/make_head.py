@@ -37,7 +37,7 @@ from fba.sampling import smoothstep
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
-TEETH = np.array([0.0, -0.0713, 0.0823])
+TEETH = np.array([0.0, -0.0728, 0.0829])
 """Point at which the edges of the middle incisors meet."""
 BEHIND = 0.012
 """Metres from there to the middle of the lips."""
@@ -192,12 +192,12 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     y, z = surface.vertices[:, 1], surface.vertices[:, 2]
     oily = 1 - smoothstep(np.abs(surface.vertices[:, 0]) / 0.03)
     oily = oily * smoothstep((z + 0.01) / 0.02) * smoothstep((y + 0.05) / 0.03)
-    gloss = 0.38 + 0.06 * oily + 0.10 * lips + 0.14 * wet + 0.2 * lids
+    gloss = 0.38 + 0.06 * oily + 0.12 * lips + 0.05 * wet - 0.15 * wet * (marks.lip > 0) + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped) + 0.04 * cropped
     inside = near & (ring < 0)
-    depth = np.maximum(smoothstep((-0.012 - z) / 0.055), 0.8 * smoothstep((-ring - 0.5) / 3.5)) * inside
-    colours[:, :3] *= 1 - depth[:, None] * (0.68, 0.78, 0.78)
+    depth = np.maximum(smoothstep((0.002 - z) / 0.060), 0.3 * smoothstep((-ring - 0.5) / 3.5)) * inside
+    colours[:, :3] *= 1 - depth[:, None] * (0.48, 0.60, 0.60)
     colours[:, 3] *= np.where(
         near, 0.1 + 0.9 * smoothstep(ring / sculpt.CONTACT_RING), 1.0
     )  # no sky in there

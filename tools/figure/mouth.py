@@ -10,14 +10,16 @@ from meshes import Mesh, join, mirror, tube
 
 from fba.arrays import Float64
 
-ENAMEL = np.array([0.86, 0.79, 0.66])
+ENAMEL = np.array([0.93, 0.88, 0.77])
 """Linear light."""
-NECK = np.array([0.76, 0.63, 0.46])
-GUM = np.array([0.52, 0.165, 0.145])
-TONGUE = np.array([0.50, 0.170, 0.155])
-TONGUE_UNDER = np.array([0.34, 0.09, 0.09])
-HALF_WIDTH, DEPTH = 0.0272, 0.0400
-"""Half axes of the outer edge of the upper arch of teeth, half an ellipse, metres."""
+NECK = np.array([0.86, 0.76, 0.58])
+GUM = np.array([0.60, 0.225, 0.20])
+TONGUE = np.array([0.60, 0.195, 0.18])
+TONGUE_UNDER = np.array([0.44, 0.13, 0.125])
+HALF_WIDTH, DEPTH = 0.0285, 0.0420
+"""Half axes of the outer edge of the upper arch of teeth, half an oval, metres."""
+UPPER_POWER, LOWER_POWER = 2.55, 2.1
+"""How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
 AROUND = 12
@@ -29,14 +31,13 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
     front: (3,), point at which the edges of the middle incisors meet those of the other jaw.
     """
     sign = 1.0 if upper else -1.0
-    inset = 0.0 if upper else LOWER_INSET
     meshes: list[Mesh] = []
     with (Path(__file__).parent / "teeth.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["jaw"] == ("upper" if upper else "lower")]
     along = 0.00006
     for row in rows:
         width, height, thick = (float(row[name]) / 1000 for name in ("width", "height", "thick"))
-        place, turn = _arch(along + width / 2, inset)
+        place, turn = _arch(along + width / 2, sign)
         tooth = _tooth(width, height, thick, float(row["flat"]), int(row["place"]), sign)
         placed = _place_tooth(tooth, place, turn)
         meshes += [(mesh[0] + front, *mesh[1:]) for mesh in (placed, mirror(placed))]
@@ -46,7 +47,7 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
     lowest = np.abs(vertices[:, 1] - front[1]) < 0.0004
     score = np.where(lowest, vertices[:, 2] - 2 * np.abs(vertices[:, 0]), -1.0)
     points = {"edge": int(score.argmax())}
-    gum = _gum(front, sign, inset, rows)
+    gum = _gum(front, sign, rows)
     start = sum(len(mesh[0]) for mesh in meshes)
     meshes.append(gum)
     middle = np.flatnonzero(np.abs(gum[0][:, 0]) < 1e-9)
@@ -55,15 +56,22 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
     return join(meshes), points
 
 
-def _arch(length: float, inset: float) -> tuple[Float64, float]:
-    """Return position (3,) from the front, and turn about y, at a length along the arch from its middle."""
+def _arch(length: float, sign: float) -> tuple[Float64, float]:
+    """Return position (3,) from the front, and turn about y, at a length along the arch from its middle.
+
+    sign: 1 for the upper arch, -1 for the lower.
+    """
+    inset = 0.0 if sign > 0 else LOWER_INSET
     angle = np.linspace(0, np.pi / 2, 400)
-    x, z = (HALF_WIDTH - inset) * np.sin(angle), -DEPTH * (1 - np.cos(angle)) - inset
+    power = UPPER_POWER if sign > 0 else LOWER_POWER
+    far = (np.sin(angle) ** power + np.cos(angle) ** power) ** (-1 / power)
+    x, z = (HALF_WIDTH - inset) * np.sin(angle) * far, -DEPTH * (1 - np.cos(angle) * far) - inset
     run = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
     beyond = max(length - run[-1], 0.0)
     px, pz = np.interp(length, run, x), np.interp(length, run, z) - beyond
-    tangent = np.interp(length, run, angle)
-    return np.array([px, 0.0, pz]), float(np.arctan2(DEPTH * np.sin(tangent), HALF_WIDTH * np.cos(tangent)))
+    turns = np.arctan2(-np.gradient(z), np.gradient(x))
+    turns[0] = 0.0
+    return np.array([px, 0.0, pz]), float(np.interp(length, run, turns))
 
 
 def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
@@ -96,12 +104,13 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
     # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
-    behind = np.array([0.60, 0.54, 0.50]) ** (max(place - 2, 0) ** 1.15)
+    behind = np.array([0.95, 0.935, 0.915]) ** (max(place - 2, 0) ** 1.15)
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * behind
-    colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1]])
+    fissure = 1.0 if flat < 0.5 else 0.72
+    colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1] * fissure])
     # Between the teeth it is darker.
-    side = np.concatenate([np.tile(np.abs(cx) ** 8, len(rows)), [0.0]])
-    colours = colours * (1 - side[:, None] * (0.52, 0.60, 0.64))
+    side = np.concatenate([np.tile(np.abs(cx) ** 6, len(rows)), [0.0]])
+    colours = colours * (1 - side[:, None] * (0.30, 0.42, 0.50))
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 
@@ -120,7 +129,7 @@ def _place_tooth(tooth: Mesh, place: Float64, turn: float) -> Mesh:
     return np.stack([x, vertices[:, 1], z], axis=1) + place, triangles, colours
 
 
-def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) -> Mesh:
+def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
     """Return the mesh of the gum: a band along the arch, scalloped round the necks of the teeth."""
     widths = np.array([float(row["width"]) for row in rows]) / 1000
     heights = np.array([float(row["height"]) for row in rows]) / 1000
@@ -131,10 +140,10 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
         tooth = min(int(np.searchsorted(ends, length, side="right")) - 1, len(widths) - 1)
         across = (length - ends[tooth]) / widths[tooth] * 2 - 1
         low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
-    positions = [_arch(length, inset) for length in half]
-    profile = [  # out of the arch (mm), above the scallop (mm)
-        (-2.0, -0.4), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), (0.7, 5.5), (-2.0, 9.5), (-8.8, -0.4),
-    ]  # fmt: skip
+    positions = [_arch(length, sign) for length in half]
+    # Out of the arch (mm), above the scallop (mm): the lower gum stays within the lip's inner side.
+    under = ((0.7, 5.5), (-2.0, 9.5)) if sign > 0 else ((-1.2, 4.5), (-5.0, 9.5))
+    profile = [(-2.0, -0.4), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), *under, (-8.8, -0.4)]
     band = np.zeros((len(profile), len(half), 3))
     for k, (place, turn) in enumerate(positions):
         outward = np.array([np.sin(turn), 0.0, np.cos(turn)])
@@ -149,9 +158,9 @@ def _gum(front: Float64, sign: float, inset: float, rows: list[dict[str, str]]) 
     triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
     if sign < 0:
         triangles = triangles[:, ::-1].copy()
-    shade = 1 - 0.55 * np.abs(np.linspace(-1, 1, columns)) ** 1.5
+    shade = 1 - 0.40 * np.abs(np.linspace(-1, 1, columns)) ** 1.5
     colours = np.tile(GUM, (len(profile), columns, 1)) * shade[None, :, None]
-    colours[4:] *= np.linspace(0.95, 0.45, len(profile) - 4)[:, None, None]
+    colours[4:] *= np.linspace(0.95, 0.60, len(profile) - 4)[:, None, None]
     flat = np.concatenate([colours, np.full((*colours.shape[:2], 1), 0.6)], axis=2)
     return band.reshape(-1, 3) + front, triangles, flat.reshape(-1, 4)
 
@@ -193,15 +202,15 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     under = np.clip(0.5 - cy, 0, 1)[None, :, None]
     colours = TONGUE * (1 - under) + TONGUE_UNDER * under
     # Darker, and redder, towards the throat; pale papillae on its back, and a dark groove along its middle.
-    colours = colours * (0.16 + 0.84 * t[:, None, None] ** (1.3, 1.6, 1.6))
+    colours = colours * (0.30 + 0.70 * t[:, None, None] ** (1.2, 1.4, 1.4))
     middle = np.exp(-((cx / 0.16) ** 2)) * (cy > 0.3)
-    colours = colours * (1 - 0.42 * (middle * np.clip((1 - t[:, None]) * 8, 0, 1)))[..., None]
+    colours = colours * (1 - 0.30 * (middle * np.clip((1 - t[:, None]) * 8, 0, 1)))[..., None]
     random = np.random.default_rng(5)
-    colours = colours * (1 + 0.30 * (random.random((rings, around, 1)) - 0.5))
+    colours = colours * (1 + 0.22 * (random.random((rings, around, 1)) - 0.5))
     flat_colours = np.concatenate([colours.reshape(-1, 3), [TONGUE * 0.2], [TONGUE]])
     body = int(np.abs(t - 0.568).argmin())
     upward = around // 4
     side = int(np.abs(t - 0.64).argmin()) * around
     points = {"6.1": point, "6.2": body * around + upward, "6.3": side, "6.4": side + around // 2}
-    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.1)])
+    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.45)])
     return mesh, points

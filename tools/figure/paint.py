@@ -17,7 +17,7 @@ from fba.sampling import smoothstep
 
 SIZE = 2048
 
-MOUTH = np.array([96, 34, 34.0])
+MOUTH = np.array([158, 76, 72.0])
 """sRGB, 0..255."""
 HAIR_WIDTH = 0.00023
 """Metres."""
@@ -156,8 +156,8 @@ def _complexion(p: Float64, looks: Looks) -> Float64:
         ((84, -15, -98), 44, 0.12), ((0, 40, 12), 40, 0.10),
     ):  # fmt: skip
         colour = _blend(colour, np.array(looks.blush), _spot(p, centre, radius) * share * broad)
-    colour += np.array([6, 4.6, 3.6]) * (noise(p, 0.018, 2) * 0.9 + noise(p, 0.007, 3) * 0.9)[:, None]
-    red = noise(p, 0.0042, 4)[:, None] * np.array([1.5, -4.0, -4.2])
+    colour += np.array([6.5, 5.4, 4.6]) * (noise(p, 0.018, 2) * 0.9 + noise(p, 0.007, 3) * 0.9)[:, None]
+    red = noise(p, 0.0042, 4)[:, None] * np.array([2.2, -5.4, -5.4])
     fine = noise(p, 0.0011, 5)[:, None] * np.array([4.2, 4.2, 4.0])
     pores = np.clip(noise(p, 0.00065, 6) - 0.45, 0, 1)[:, None]
     nose = np.clip(_spot(p, (6, -34, 24), 26) + _spot(p, (28, -34, 6), 26) * 0.7, 0, 1)[:, None]
@@ -184,8 +184,10 @@ def _lines(colour: Float64, p: Float64, looks: Looks) -> Float64:
     """Return the colour with the lines of an old skin: shade within, light along their lower edges."""
     if not looks.lines:
         return colour
-    x, y = np.abs(p[:, 0]) * 1000, p[:, 1] * 1000
-    front = smoothstep((p[:, 2] + 0.045) / 0.02)
+    # They wander, fade and return, each side its own way.
+    x = np.abs(p[:, 0]) * 1000 + 1.1 * noise(p, 0.0055, 21) + 0.35 * noise(p, 0.0018, 22)
+    y = p[:, 1] * 1000 + 1.1 * noise(p, 0.0055, 23) + 0.35 * noise(p, 0.0018, 24)
+    front = smoothstep((p[:, 2] + 0.045) / 0.02) * (0.72 + 0.45 * noise(p, 0.0045, 25))
     for points, width, depth in LINES:
         knots = np.array(points, dtype=np.float64)
         run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
@@ -196,7 +198,7 @@ def _lines(colour: Float64, p: Float64, looks: Looks) -> Float64:
         fade = np.sin(np.pi * np.clip(row / 59, 0.02, 0.98)) ** 0.6 * front[near] * depth * looks.lines
         below = np.sign(y[near] - path[row, 1])
         light = np.exp(-(((distance - 2 * width) / (1.2 * width)) ** 2)) * (below < 0)
-        factor = 1 - 0.30 * fade * np.exp(-((distance / width) ** 2)) + 0.09 * fade * light
+        factor = 1 - 0.26 * fade * np.exp(-((distance / (1.25 * width)) ** 2)) + 0.07 * fade * light
         colour[near] *= factor[:, None]
     return colour
 
@@ -224,17 +226,17 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
 def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Looks) -> Float64:
     near = ring < 90
     corner = smoothstep((np.abs(p[:, 0]) - 0.015) / 0.012)
-    border = np.where(side > 0, 5.0, 5.1) - 1.9 * corner  # the red of the lips is narrower in the corners
-    red = np.where(near, smoothstep((border + 0.55 - ring) / 1.0), 0.0)
+    border = np.where(side > 0, 4.6, 4.6) - 1.7 * corner  # the red of the lips is narrower in the corners
+    red = np.where(near, smoothstep((border + 0.8 - ring) / 1.7), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
     lip = (
         np.array(looks.lip)
         + lines[:, None] * np.array([9, 9, 8.0])
         + (side > 0)[:, None] * np.array([-8, -7, -6.0])
     )
-    colour = _blend(colour, lip, red * 0.88)
+    colour = _blend(colour, lip, red * 0.85)
     seam = np.where(near, smoothstep((2.1 - ring) / 1.2), 0.0) * (1 - 0.6 * corner)
-    colour = _blend(colour, np.array(looks.lip_line), seam * 0.8)
+    colour = _blend(colour, np.array(looks.lip_line), seam * 0.7)
     inside = np.where(near, smoothstep((0.6 - ring) / 1.2), 0.0)
     colour = _blend(colour, MOUTH, inside)
     # A light edge above the upper lip.

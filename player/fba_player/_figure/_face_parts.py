@@ -31,7 +31,7 @@ TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
 MAX_HAIR_WIDTH = 0.0012
 """Strips wider than this (m) are not single hairs."""
-RELIEF_STRENGTH = 0.36
+RELIEF_STRENGTH = 0.60
 """Strength of the skin's relief."""
 NECK_LENGTH = 2.3
 """Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""

@@ -29,7 +29,7 @@ MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
 """FAPs of a mouth so wide open that light falls in."""
 FREE_LIGHT = (0.9, 0.8, 0.0, 0.3)
 """Light on a tongue that is put out: key, sky, through, rim."""
-TEETH_FILL_SHARE = 0.45
+TEETH_FILL_SHARE = 0.62
 """Share of the missing light that is added on teeth when the mouth is open."""
 UPPER_LIDS, CLOSED = (19, 20), 1024
 """FAPs of the upper lids, and the value that closes them."""
@@ -39,7 +39,7 @@ CLOSING_SKY = 0.45
 """Least share of the sky's light along lips and lids, where they touch."""
 ENCLOSED = 0.04
 """Vertices near the mouth that see less of the sky than this while it is shut may be inside."""
-INSIDE_KEY, INSIDE_SKY = 0.20, 0.36
+INSIDE_KEY, INSIDE_SKY = 0.38, 0.46
 """Shares of key light and sky that reach the inside of an open mouth by reflection."""
 CONSTANT_HARMONIC = 0.282095
 """The first spherical harmonic, equal in all directions."""

@@ -26,15 +26,15 @@ TEXELS = 256
 SHAPE = (round((TOP - BOTTOM) * TEXELS), round(WIDTH * TEXELS))
 PLAIN = 128
 """Value where there is no wrinkle; lower is darker."""
-EDGE_BRIGHTNESS = 0.42
+EDGE_BRIGHTNESS = 0.34
 """Brightness of the lower edge, as a share of the groove's darkness."""
 EDGE_BELOW = 1.7
 """Distance of the brightest line of the edge below the groove, in widths of the groove."""
 EDGE_BREADTH = 1.5
 """Breadth of the edge, in widths of the groove."""
-END_STEEPNESS = 4.0
-"""How steeply lines thin out towards their ends: over a quarter of their length each."""
-CACHE_VERSION = 1
+END_STEEPNESS = 2.6
+"""How steeply lines thin out towards their ends: over two fifths of their length each."""
+CACHE_VERSION = 2
 """Cache version; increment when `wrinkle_map` gives other pixels."""
 
 Stroke = tuple[Sequence[tuple[float, float]], float, float]
@@ -58,17 +58,19 @@ STROKES: dict[str, tuple[Stroke, ...]] = {
         (((-0.130, 0.050), (0.000, 0.035), (0.130, 0.050)), 0.016, 0.60),
     ),
     "eye corner": (
-        (((0.800, 0.020), (0.900, 0.062), (1.000, 0.115)), 0.012, 0.70),
-        (((0.790, -0.030), (0.890, -0.018), (1.010, 0.005)), 0.013, 0.95),
-        (((0.775, -0.080), (0.870, -0.112), (0.980, -0.155)), 0.013, 0.95),
-        (((0.740, -0.130), (0.820, -0.190), (0.910, -0.270)), 0.012, 0.75),
-        (((0.300, -0.150), (0.400, -0.225), (0.530, -0.255), (0.670, -0.215)), 0.014, 0.65),
-        (((0.330, -0.240), (0.430, -0.305), (0.560, -0.325), (0.680, -0.290)), 0.014, 0.35),
+        (((0.755, 0.040), (0.840, 0.072), (0.930, 0.118)), 0.014, 0.38),
+        (((0.760, -0.005), (0.850, 0.006), (0.935, 0.030), (1.010, 0.040)), 0.018, 0.60),
+        (((0.750, -0.050), (0.830, -0.064), (0.915, -0.092), (0.990, -0.108)), 0.020, 0.72),
+        (((0.725, -0.095), (0.800, -0.140), (0.860, -0.192), (0.930, -0.235)), 0.018, 0.55),
+        (((0.855, -0.040), (0.930, -0.036)), 0.012, 0.25),
+        (((0.690, -0.165), (0.760, -0.225), (0.820, -0.300)), 0.018, 0.30),
+        (((0.290, -0.140), (0.400, -0.220), (0.530, -0.250), (0.670, -0.205)), 0.020, 0.50),
+        (((0.350, -0.260), (0.450, -0.312), (0.560, -0.325), (0.660, -0.295)), 0.020, 0.24),
     ),
     "cheek": (
         (((0.250, -0.400), (0.325, -0.510), (0.410, -0.610), (0.495, -0.730), (0.560, -0.860),
-          (0.600, -0.980), (0.605, -1.080)), 0.036, 0.62),
-        (((0.290, -0.540), (0.335, -0.590), (0.405, -0.670), (0.485, -0.800), (0.535, -0.930)), 0.075, 0.30),
+          (0.600, -0.980), (0.605, -1.080)), 0.036, 0.56),
+        (((0.290, -0.540), (0.335, -0.590), (0.405, -0.670), (0.485, -0.800), (0.535, -0.930)), 0.075, 0.17),
         (((0.640, -0.930), (0.668, -1.010), (0.660, -1.090)), 0.016, 0.40),
     ),
 }  # fmt: skip
@@ -101,8 +103,9 @@ def _stroke(across: Float64, up: Float64, points: Sequence[tuple[float, float]],
     line = _smooth(np.array(points))
     along = np.linspace(0, 1, len(line))
     strength = np.zeros(across.shape)
-    for (x, y), where in zip(line, along, strict=True):
-        fade = min(1.0, END_STEEPNESS * min(where, 1 - where) + 0.05)
+    uneven = 0.87 + 0.13 * np.sin(31.0 * line[:, 0] + 23.0 * line[:, 1])
+    for (x, y), where, share in zip(line, along, uneven, strict=True):
+        fade = min(1.0, END_STEEPNESS * min(where, 1 - where) + 0.05) * share
         sigma = width * (0.55 + 0.45 * fade)
         reach = 3 * sigma
         near = (np.abs(across[0] - x) < reach).nonzero()[0]
