@@ -40,6 +40,7 @@ def make_shoes(body: Float64, weights: Float64) -> Garment:
         np.concatenate([left_weights, left_weights[:, MIRROR]]),
         np.where(body[:, 1] < TOP_HEIGHT + 0.01, COVERED_HEIGHT - body[:, 1], -1.0),
         np.zeros(2 * len(vertices), dtype=bool),
+        np.ones(2 * len(vertices)),
     )
 
 
