@@ -13,7 +13,6 @@ from clothes import (
     ELBOW,
     HEM,
     SHOULDER,
-    SLEEVE,
     Garment,
     depth_below_collar,
     height_above_hem,
@@ -32,8 +31,8 @@ from fba.rotations import unit
 from fba.sampling import smoothstep
 
 NAMES = list(Skeleton.default().names)
-ARMHOLE = 0.012
-"""Metres along the upper arm at which the sleeve is sewn on."""
+ARMHOLE = 0.163
+"""Metres from the middle at which a sleeve is sewn on."""
 SIZE = 1024
 """Texels of the picture along each side."""
 DENSITY = 900
@@ -260,15 +259,14 @@ def sew(name: str, garment: Garment) -> tuple[Garment, Float64 | None, bytes | N
 def _shirt_seams(p: Float64, tube: int) -> Float64:
     """Return (N,) metres from points (N, 3) to the nearest stitches of the shirt."""
     if tube:
-        return np.minimum(np.abs(length_inside_sleeve(p) - 0.018), np.abs(_along_arm(p) - ARMHOLE))
-    lines = np.abs(depth_below_collar(p) - 0.016), np.abs(p[:, 1] - HEM - 0.020), np.abs(_along_arm(p) - ARMHOLE)
+        return np.minimum(np.abs(length_inside_sleeve(p) - 0.018), np.abs(_beyond_armhole(p) - ARMHOLE))
+    lines = np.abs(depth_below_collar(p) - 0.016), np.abs(p[:, 1] - HEM - 0.020), np.abs(_beyond_armhole(p) - ARMHOLE)
     return np.min(lines, axis=0)
 
 
-def _along_arm(p: Float64) -> Float64:
-    """Return (N,) metres along the upper arm; far where points (N, 3) are below the armhole."""
-    along = SLEEVE * np.linalg.norm(ELBOW - SHOULDER) - length_inside_sleeve(p)
-    return np.where((np.abs(p[:, 0]) > 0.12) & (p[:, 1] > 1.29), along, 1.0)
+def _beyond_armhole(p: Float64) -> Float64:
+    """Return (N,) metres from the armhole outwards; far where points (N, 3) are below it."""
+    return np.where(p[:, 1] > 1.29, np.abs(p[:, 0]) - ARMHOLE, 1.0)
 
 
 def _trouser_seams(p: Float64, tube: int) -> Float64:

@@ -1,13 +1,14 @@
-"""The shadow of bodies on the ground, from a large key light and the sky: a map that shaders draw.
+"""The shadows of bodies on the ground, and on bodies, from a large key light and the sky: maps that shaders draw.
 
 The first pass throws all triangles onto the ground, along the key light and straight down, and keeps how near
-the ground the lowest of them is; what is around each piece of ground comes from halved copies of that. The
-second finds the darkness: the nearer what hides the light, the sharper. The third draws it on the ground.
+the ground the lowest of them is, and how high what the key light reaches first: bodies are in the shade below
+that. What is around each piece of ground comes from halved copies of the former. The second pass finds the
+darkness: the nearer what hides the light, the sharper. The third draws it on the ground.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from fba_player._figure.face_light import KEY_DIRECTION
 from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniform, write_buffer
 from fba_player.view._view import FaceMesh, FaceShape
 
-HEIGHTS = 256
+HEIGHTS = 512
 """Texels of the map of heights along each side."""
 CELLS = 64
 """Texels of the darkness along each side."""
@@ -30,17 +31,26 @@ CACHED_SHAPES = 512
 """Number of shapes whose casting vertices are cached."""
 
 
+class Shade(NamedTuple):
+    """A map of heights that the key light reaches first, over the ground from `low` (x, z) on, metres."""
+
+    tops: Any
+    low: tuple[float, float]
+    width: float
+
+
 class GroundShadow:
     """Draws shadows on the ground y = 0. Owns what it allocates on the moderngl context; `close` frees it."""
 
     def __init__(self, context: Any) -> None:
         self._gl = context
         self._heights = context.texture((HEIGHTS, HEIGHTS), 4, dtype="f2")
+        self._tops = context.texture((HEIGHTS, HEIGHTS), 2, dtype="f4")
         self._darkness = context.texture((CELLS, CELLS), 1, alignment=1)
         self._darkness.filter = (context.LINEAR, context.LINEAR)
-        for texture in (self._heights, self._darkness):
+        for texture in (self._heights, self._tops, self._darkness):
             texture.repeat_x = texture.repeat_y = False
-        self._thrown = context.framebuffer([self._heights])
+        self._thrown = context.framebuffer([self._heights, self._tops])
         self._shaded = context.framebuffer([self._darkness])
         self._shapes = RecentlyUsed[tuple[Intp, Int32]](CACHED_SHAPES, lambda _: None)
         self._thrown_parts: list[Any] = []
@@ -52,14 +62,14 @@ class GroundShadow:
             for name in ("shaded", "cast")
         }
 
-    def draw(self, meshes: list[FaceMesh], places: Float32, camera: bytes) -> bool:
+    def draw(self, meshes: list[FaceMesh], places: Float32, camera: bytes) -> Shade | None:
         """Draw the shadow of meshes around `places` (N, 2), x and z, into the bound framebuffer.
 
-        camera: the matrix to clip space. Returns whether there are any that cast one.
+        camera: the matrix to clip space. Returns the map of shadows, or None if no mesh casts any.
         """
         casting = [mesh for mesh in meshes if _casts(mesh)]
         if not casting:
-            return False
+            return None
         gl, target, viewport = self._gl, self._gl.fbo, self._gl.viewport
         low, width = _ground_around(places)
         self._find(casting, low, width)
@@ -71,7 +81,7 @@ class GroundShadow:
         for name, value in (("camera", camera), ("low", low), ("width", width)):
             set_uniform(self._programs["cast"], name, value)
         self._arrays["cast"].render(gl.TRIANGLE_STRIP)
-        return True
+        return Shade(self._tops, low, width)
 
     def darkness(self, meshes: list[FaceMesh], places: Float32) -> UInt8:
         """Return uint8 (CELLS, CELLS): the darkness of the ground that `draw` draws, rows along z."""
@@ -95,8 +105,9 @@ class GroundShadow:
             self._throw(casting)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(gl.NOTHING)
-        self._heights.build_mipmaps()
-        self._heights.filter = (gl.LINEAR_MIPMAP_NEAREST, gl.LINEAR)
+        for texture in (self._heights, self._tops):
+            texture.build_mipmaps()
+            texture.filter = (gl.LINEAR_MIPMAP_NEAREST, gl.LINEAR)
         self._shaded.use()
         gl.viewport = (0, 0, CELLS, CELLS)
         self._heights.use(0)
@@ -133,7 +144,7 @@ class GroundShadow:
     def close(self) -> None:
         for part in (
             *self._thrown_parts, *self._arrays.values(), *self._programs.values(), self._square, self._thrown,
-            self._shaded, self._heights, self._darkness,
+            self._shaded, self._heights, self._tops, self._darkness,
         ):  # fmt: skip
             part.release()
 

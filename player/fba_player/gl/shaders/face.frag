@@ -20,6 +20,21 @@ in vec4 wrinkles;
 #endif
 in vec4 upright;
 in vec4 coordinates;
+#ifdef SHADED
+uniform sampler2D tops;    // height of what the key light reaches first, along itself, and its square
+in vec3 before;
+#ifdef SMOOTH
+in vec3 keyed;
+#endif
+
+// Share of the key light, from mean and variance of the heights around: at most this share of them is not above.
+// Little of that comes from heights that differ by more than one surface can.
+float unshaded() {
+    vec2 mean = mix(textureLod(tops, before.xy, 1.0).rg, textureLod(tops, before.xy, 2.0).rg, 0.6);
+    float above = max(mean.x - before.z, 0.0), spread = max(mean.y - mean.x * mean.x, 1e-5);
+    return 0.12 + 0.88 * clamp((spread / (spread + above * above) - 0.2) * 1.25, 0.0, 1.0);
+}
+#endif
 #ifdef SMOOTH
 in vec4 shade;
 in vec4 halfway;
@@ -57,9 +72,18 @@ void main() {
     float depth = dot(texture(wrinkle_map, spot) - 128.0 / 255.0, wrinkles) * 2.0;
     albedo *= max(1.0 + DARKENS * depth, 0.2);
 #endif
+#ifdef SHADED
+    float lit = unshaded();
+#else
+    const float lit = 1.0;
+#endif
 #ifdef SMOOTH
     vec3 n = upright.xyz;
+#ifdef SHADED
+    vec3 base = (shade.rgb + lit * keyed) * albedo;
+#else
     vec3 base = shade.rgb * albedo;
+#endif
 #ifdef FINE
     vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
     base *= 1.0 + 0.40 * dot(grain, KEY_DIRECTION);
@@ -68,10 +92,11 @@ void main() {
     float cosine = dot(n, halfway.xyz);
     float nh2 = min(cosine * cosine / (dot(n, n) * dot(halfway.xyz, halfway.xyz)), 1.0);
     vec2 left = unlost(albedo);
-    vec3 shown = base + KEY * (shade.a * left.x * lobes(nh2, coordinates.w)) + AROUND * (halfway.w * left.y);
+    vec3 shown = base + KEY * (lit * shade.a * left.x * lobes(nh2, coordinates.w)) + AROUND * (halfway.w * left.y);
 #else
     vec3 n = normalize(upright.xyz);
     vec3 view = normalize(eye - place);
+    vec4 reach = vec4(lit * light.x, light.yzw);
     albedo *= colour.rgb;
     vec3 rough = n;
 #ifdef FINE
@@ -81,9 +106,9 @@ void main() {
 #endif
     float cosine = dot(rough, normalize(view + KEY_DIRECTION));
     vec2 left = unlost(albedo);
-    vec3 shown = albedo * diffuse(n, albedo, light, scatter)
-        + KEY * (mirrored_key(view, n, light) * left.x * lobes(cosine * cosine, coordinates.w))
-        + AROUND * (mirrored_around(view, n, colour.a, light) * left.y);
+    vec3 shown = albedo * diffuse(n, albedo, reach, scatter)
+        + KEY * (mirrored_key(view, n, reach) * left.x * lobes(cosine * cosine, coordinates.w))
+        + AROUND * (mirrored_around(view, n, colour.a, reach) * left.y);
 #endif
     pixel = vec4(encode(shown), opaque);
 }

@@ -3,6 +3,8 @@
 uniform vec3 eye;
 
 const vec3 KEY_DIRECTION = normalize(vec3(0.70, 0.68, 0.80));
+const vec2 SHADOW_STEP = vec2(0.70, 0.80) / 0.68;  // by which the key light goes sideways for each metre down
+const float HIGHEST = 4.0;                          // metres: range of the map of what is near the ground
 const vec3 FILL_DIRECTION = normalize(vec3(-0.9, 0.15, 0.6));
 const vec3 BACK_DIRECTION = normalize(vec3(0.45, 0.35, -0.95));
 const vec3 RIM_DIRECTION = normalize(vec3(-0.55, 0.50, -0.85));

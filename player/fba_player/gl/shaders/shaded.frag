@@ -1,10 +1,10 @@
 #version 330 core
+//include lighting.glsl
 // How dark the ground is: from the map of how near the ground is what stands before key light and sky.
 uniform sampler2D heights;      // along the key light, then from above: nearness, and what share is covered
 uniform float width;            // metres of ground
 out vec4 pixel;
 
-const float HIGHEST = 4.0;
 const float CELLS = 64.0;
 const float KEY_SHARE = 0.62;   // darkness where all of the key light is hidden
 const float SKY_SHARE = 0.85;   // and where all of the sky is
