@@ -27,7 +27,7 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
-INSIDE = 0.7
+INSIDE = 0.95
 """Brightness of the inside of sleeves, hems and collar, relative to the cloth."""
 HEM, WAIST = 0.932, 0.982
 TURN_UP = (0.066, 0.48)
@@ -58,6 +58,7 @@ class Garment:
 
     covered: depth of each vertex of the person under the garment, metres; negative where it is free.
     inside (V,): mask of vertices folded in at an edge, which is a crease. within (V,): metres from the edge.
+    places (V, 2): of vertices in `picture`, a JPEG file, 0..1 from its left and upper edge.
     """
 
     vertices: Float64
@@ -67,6 +68,8 @@ class Garment:
     covered: Float64
     inside: Bool
     within: Float64
+    places: Float64 | None = None
+    picture: bytes | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,7 @@ from clothes import (
     length_inside_sleeve,
 )
 from hair import noise
-from paint import encode_jpeg, make_chart
-from PIL import Image
+from paint import encode_linear, make_chart
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
@@ -243,10 +242,10 @@ def legs() -> tuple[Tube, ...]:
     )
 
 
-def sew(name: str, garment: Garment) -> tuple[Garment, Float64 | None, bytes | None]:
-    """Return a garment with its folds, places (V, 2) of its vertices in its picture, and that; shoes have none."""
+def sew(name: str, garment: Garment) -> Garment:
+    """Return a garment with its folds and its picture; shoes as they are."""
     if name == "shoes":
-        return garment, None, None
+        return garment
     middle = garment.vertices[garment.triangles].mean(axis=1)
     left = middle[:, 0] > 0
     if name == "trousers":
@@ -281,8 +280,8 @@ def _trouser_seams(p: Float64, tube: int) -> Float64:
 
 def fold(
     garment: Garment, tubes: tuple[Tube, ...], own: Int64, edges: Callable[[Float64, int], Float64]
-) -> tuple[Garment, Float64, bytes]:
-    """Return the garment with folds, places (V, 2) of its vertices in the picture, 0..1, and the picture.
+) -> Garment:
+    """Return the garment with folds and its picture.
 
     own (F,): the tube that each triangle is on. edges(points, tube): metres (N,) from seams and stitches.
     """
@@ -306,7 +305,7 @@ def fold(
     unique, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     rows = unique[:, 0].astype(int)
     folded.colours[:, :3] /= WHITE
-    split = replace(
+    return replace(
         folded,
         vertices=folded.vertices[rows],
         triangles=number.reshape(-1, 3),
@@ -314,8 +313,9 @@ def fold(
         weights=folded.weights[rows],
         inside=folded.inside[rows],
         within=folded.within[rows],
+        places=places.reshape(-1, 2)[first],
+        picture=picture,
     )
-    return split, places.reshape(-1, 2)[first], picture
 
 
 def _paint(
@@ -344,5 +344,4 @@ def _paint(
         away = edges(p, number)
         shade *= 1 - 0.38 * np.exp(-((away / STITCH) ** 2)) + 0.10 * np.exp(-(((away - 0.004) / 0.002) ** 2))
         image[chart.known] = WHITE * shade
-    shown = np.where(image <= 0.0031308, image * 12.92, 1.055 * np.maximum(image, 1e-9) ** (1 / 2.4) - 0.055)
-    return encode_jpeg(Image.fromarray(np.rint(np.clip(shown, 0, 1) * 255).astype(np.uint8)), 88)
+    return encode_linear(image)

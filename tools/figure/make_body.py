@@ -95,10 +95,10 @@ def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
         "neck": _piece("neck", _neck(surface, of_tile == 0, bones), colour),
     }
     for name, garment in made.items():
-        sewn, places, picture = folds.sew(name, garment)
+        sewn = folds.sew(name, garment)
         pieces[name] = Piece(
             "shoe" if name == "shoes" else "cloth", sewn.vertices, sewn.triangles, sewn.colours, sewn.weights,
-            _welded_normals(sewn), places, picture,
+            _welded_normals(sewn), sewn.places, sewn.picture,
         )  # fmt: skip
     pieces["skin"].colours[:, :3] *= _flush_factors(pieces["skin"], bones)
     _paint_nails(pieces["skin"], bones)

@@ -146,6 +146,7 @@ class FaceRenderer:
                 ("HAIRS", shape.across is not None),
                 ("LIMBS", mesh.limbs is not None),
                 ("SHADED", self._shade is not None),
+                ("FINELY", self._shade is not None and self._shade.finely),
                 ("TEXTURED", picture is not None),
                 ("WRINKLED", wrinkles is not None),
                 ("FINE", repeats is not None),
@@ -165,8 +166,8 @@ class FaceRenderer:
         if self._shade is not None:
             self._shade.tops.use(3)
             set_uniform(program, "tops", 3)
-            clear = CLEAR_OF_FACES if mesh.limbs is None else CLEAR
-            set_uniform(program, "ground", (*self._shade.low, 1 / self._shade.width, clear))
+            set_uniform(program, "frame", self._shade.frame)
+            set_uniform(program, "clearance", CLEAR_OF_FACES if mesh.limbs is None else CLEAR)
         if picture is not None:
             picture.use(0)
         if repeats is not None:

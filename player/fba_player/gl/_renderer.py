@@ -134,7 +134,7 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        self._faces.begin(eye, matrix, pixel, shade)
+        self._faces.begin(eye, matrix, pixel, shade and shade._replace(finely=not smoothed))
         self._faces.draw(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)

@@ -1,5 +1,11 @@
 #version 330 core
 //include lighting.glsl
+#ifdef FINELY
+in vec3 before;
+#ifdef SMOOTH
+in vec3 keyed;
+#endif
+#endif
 uniform sampler2D picture; // square roots of linear light
 uniform sampler2D relief;  // noise of three channels
 uniform vec2 fine;         // strength of the skin's relief, 0 for none, and its repetitions
@@ -20,21 +26,6 @@ in vec4 wrinkles;
 #endif
 in vec4 upright;
 in vec4 coordinates;
-#ifdef SHADED
-uniform sampler2D tops;    // height of what the key light reaches first, along itself, and its square
-in vec3 before;
-#ifdef SMOOTH
-in vec3 keyed;
-#endif
-
-// Share of the key light, from mean and variance of the heights around: at most this share of them is not above.
-// Little of that comes from heights that differ by more than one surface can.
-float unshaded() {
-    vec2 mean = mix(textureLod(tops, before.xy, 1.0).rg, textureLod(tops, before.xy, 2.0).rg, 0.6);
-    float above = max(mean.x - before.z, 0.0), spread = max(mean.y - mean.x * mean.x, 1e-5);
-    return 0.12 + 0.88 * clamp((spread / (spread + above * above) - 0.2) * 1.25, 0.0, 1.0);
-}
-#endif
 #ifdef SMOOTH
 in vec4 shade;
 in vec4 halfway;
@@ -72,17 +63,16 @@ void main() {
     float depth = dot(texture(wrinkle_map, spot) - 128.0 / 255.0, wrinkles) * 2.0;
     albedo *= max(1.0 + DARKENS * depth, 0.2);
 #endif
-#ifdef SHADED
-    float lit = unshaded();
+#ifdef FINELY
+    float lit = unshaded(before);
 #else
     const float lit = 1.0;
 #endif
 #ifdef SMOOTH
     vec3 n = upright.xyz;
-#ifdef SHADED
-    vec3 base = (shade.rgb + lit * keyed) * albedo;
-#else
     vec3 base = shade.rgb * albedo;
+#ifdef FINELY
+    base -= (1.0 - lit) * keyed * albedo;
 #endif
 #ifdef FINE
     vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;

@@ -1,12 +1,22 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
 // multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds a relief; LIMBS lets a body's limbs keep
-// the sky from each other; SHADED lets what stands before the key light throw shadows; SOLID ignores alpha, CUT makes holes where
+// the sky from each other; SHADED lets bodies throw shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where
 // it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
 // The head turns rigidly; the neck bends with it, and stands still at its lower end.
 //include lighting.glsl
+#ifdef SHADED
+uniform vec3 frame;       // corner of what the map of shadows shows, along its axes, and its share of a metre
+uniform float clearance;  // metres by which what throws a shadow is off the surface
+#ifdef FINELY
+out vec3 before;          // place in that map, and height
+#ifdef SMOOTH
+out vec3 keyed;           // the key light's part of `shade`
+#endif
+#endif
+#endif
 uniform mat4 world;
 uniform mat4 camera;
 uniform vec3 turn;       // axis of the head's rotation times its angle
@@ -36,13 +46,6 @@ in vec4 in_along;       // of hairs: direction to the tip, and which of the two 
 #endif
 out vec4 upright;       // normal, and its cosine with the direction to the eye
 out vec4 coordinates;   // in the picture; share of its pixels that a hair covers; width of reflected light
-#ifdef SHADED
-uniform vec4 ground;    // that the map of shadows covers: corner (x, z), its share of a metre, and clearance (m)
-out vec3 before;        // place in that map, and height (m)
-#ifdef SMOOTH
-out vec3 keyed;         // the key light's part of `shade`
-#endif
-#endif
 #ifdef SMOOTH
 out vec4 shade;         // diffuse light times the colour, and the reflected share of the key light
 out vec4 halfway;       // between the directions to the eye and to the key light; other reflected light
@@ -114,8 +117,13 @@ void main() {
     coordinates = vec4(in_texture, cover, widths(in_colour.a));
     gl_Position = camera * stands;
 #ifdef SHADED
-    vec3 off = stands.xyz + ground.w * n;
-    before = vec3((off.xz - off.y * SHADOW_STEP - ground.xy) * ground.z, off.y + ground.w);
+#ifndef FINELY
+    vec3 before;
+#endif
+    before = vec3(((stands.xyz + clearance * n) * BEFORE - frame.xy) * frame.z, stands.y + clearance * (n.y + 1.0));
+#ifndef FINELY
+    reach.x *= unshaded(before);
+#endif
 #endif
 #ifdef WRINKLED
     wrinkle_place = in_wrinkle;
@@ -127,11 +135,9 @@ void main() {
 #else
     vec3 albedo = in_colour.rgb;
 #endif
-#ifdef SHADED
-    shade.rgb = in_colour.rgb * diffuse(n, albedo, vec4(0.0, reach.yzw), scatter);
-    keyed = in_colour.rgb * diffuse(n, albedo, reach, scatter) - shade.rgb;
-#else
     shade.rgb = in_colour.rgb * diffuse(n, albedo, reach, scatter);
+#ifdef FINELY
+    keyed = shade.rgb - in_colour.rgb * diffuse(n, albedo, vec4(0.0, reach.yzw), scatter);
 #endif
     vec2 left = unlost(in_colour.rgb);
     shade.a = mirrored_key(view, n, reach) * left.x;

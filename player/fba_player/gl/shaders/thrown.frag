@@ -1,10 +1,7 @@
 #version 330 core
-in vec4 nearness;
-in float top;
-layout(location = 0) out vec4 pixel;
-layout(location = 1) out vec2 first;
+in vec2 seen;
+out vec4 pixel;        // the greatest is kept
 
 void main() {
-    pixel = nearness;
-    first = vec2(top, top * top);
+    pixel = vec4(seen, seen.y * seen.y, 0.0);
 }
