@@ -136,8 +136,8 @@ LEG_FOLDS: tuple[Stroke, ...] = (
 class Tube:
     """Cloth around a limb, unrolled: from `start` to `end`, points (3,), of a radius in metres.
 
-    bow: metres by which its middle is before the line between both ends. side: 1 left or in the middle, -1 mirrored. place: of its middle above, in texels of the picture. whole:
-    that its folds lie on both sides.
+    bow: metres by which its middle is before the line between both ends. side: 1 left or in the middle, -1 mirrored. place: of its middle above, in texels of the picture. higher:
+    factor of the heights of its folds. whole: that they lie on both sides.
     """
 
     start: Float64
@@ -148,6 +148,7 @@ class Tube:
     place: tuple[float, float]
     side: float = 1.0
     bow: float = 0.0
+    higher: float = 1.0
     whole: bool = False
 
     @property
@@ -189,7 +190,7 @@ class Tube:
                     knots = knots + random.uniform(-JITTER, JITTER, knots.shape)
                     strength = random.uniform(*STRENGTHS)
                 for shift in (-self.turn, 0.0, self.turn):
-                    _raise(raised, around, along, knots + (shift, 0.0), WIDER * width, strength * HIGHER * height)
+                    _raise(raised, around, along, knots + (shift, 0.0), WIDER * width, strength * self.higher * HIGHER * height)
         return raised
 
     def _grid(self) -> tuple[Float64, Float64]:
@@ -237,8 +238,8 @@ def legs() -> tuple[Tube, ...]:
     """Return the tubes of the trousers: the left and the right leg."""
     hip, ankle = np.array([0.072, 0.99, -0.045]), np.array([0.155, 0.08, -0.100])
     return (
-        Tube(hip, ankle, 0.080, 0.93, LEG_FOLDS, (256, 45), bow=0.055),
-        Tube(hip, ankle, 0.080, 0.93, LEG_FOLDS, (768, 45), -1.0, 0.055),
+        Tube(hip, ankle, 0.080, 0.93, LEG_FOLDS, (256, 45), bow=0.055, higher=1.6),
+        Tube(hip, ankle, 0.080, 0.93, LEG_FOLDS, (768, 45), -1.0, 0.055, 1.6),
     )
 
 

@@ -18,8 +18,10 @@ from fba_player._figure.face_light import KEY_DIRECTION
 from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniform, write_buffer
 from fba_player.view._view import FaceMesh, FaceShape
 
-HEIGHTS, TOPS = 256, 512
+TEXELS = 256
 """Texels along each side of the maps that the sky and the key light see."""
+HALVINGS = 5
+"""How often the maps are halved."""
 CELLS = 64
 """Texels of the darkness along each side."""
 FRAMED = 0.25
@@ -48,8 +50,8 @@ class GroundShadow:
 
     def __init__(self, context: Any) -> None:
         self._gl = context
-        self._heights = context.texture((HEIGHTS, HEIGHTS), 2, dtype="f2")
-        self._tops = context.texture((TOPS, TOPS), 4, dtype="f4")
+        self._heights = context.texture((TEXELS, TEXELS), 2, dtype="f2")
+        self._tops = context.texture((TEXELS, TEXELS), 4, dtype="f4")
         self._darkness = context.texture((CELLS, CELLS), 1, alignment=1)
         self._darkness.filter = (context.LINEAR, context.LINEAR)
         for texture in (self._heights, self._tops, self._darkness):
@@ -109,12 +111,12 @@ class GroundShadow:
         gl.blend_equation = moderngl.MAX
         for sky, (texture, framebuffer) in enumerate(self._seen.items()):
             framebuffer.use()
-            gl.viewport = (0, 0, *texture.size)
+            gl.viewport = (0, 0, TEXELS, TEXELS)
             gl.clear(0.0, 0.0, 0.0, 0.0)
             set_uniform(thrown, "sky", float(sky))
             if casting:
                 self._thrown_parts[0].render()
-            texture.build_mipmaps()
+            texture.build_mipmaps(0, HALVINGS)
             texture.filter = (gl.LINEAR_MIPMAP_NEAREST, gl.LINEAR)
             texture.use(1 - sky)
         gl.blend_equation = moderngl.FUNC_ADD
@@ -181,7 +183,7 @@ def _frame_around(points: Float32) -> tuple[float, float, float]:
     seen = points @ BEFORE
     least, most = seen.min(axis=0), seen.max(axis=0)
     width = FRAMED * float(np.ceil((most - least).max() / FRAMED + 0.4))
-    u, v = np.floor(((least + most) / 2 - width / 2) * TOPS / width) * width / TOPS  # whole texels
+    u, v = np.floor(((least + most) / 2 - width / 2) * TEXELS / width) * width / TEXELS  # whole texels
     return float(u), float(v), 1 / width
 
 

@@ -32,7 +32,7 @@ MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
 MIN_RELIEF = 0.25
 """The skin's relief is not drawn if it is reduced to less than this share of its size."""
-CLEAR, CLEAR_OF_FACES = 0.009, 0.07
+CLEAR, CLEAR_OF_FACES = 0.014, 0.07
 """Metres by which what throws a shadow on a surface must be off it; faces come with shadows of their own."""
 FAR = -1e4
 """Place (m) along each axis of limbs that a body lacks: away from the light."""
