@@ -136,8 +136,9 @@ LEG_FOLDS: tuple[Stroke, ...] = (
 class Tube:
     """Cloth around a limb, unrolled: from `start` to `end`, points (3,), of a radius in metres.
 
-    bow: metres by which its middle is before the line between both ends. side: 1 left or in the middle, -1 mirrored. place: of its middle above, in texels of the picture. higher:
-    factor of the heights of its folds. whole: that they lie on both sides.
+    place: of its middle above, in texels of the picture. side: 1 left or in the middle, -1 mirrored. bow:
+    metres by which its middle is before the line between both ends. higher: factor of the heights of its
+    folds. whole: that they lie on both sides.
     """
 
     start: Float64
@@ -179,7 +180,7 @@ class Tube:
         return flat * (self.side * DENSITY, DENSITY) + self.place
 
     def heights(self, random: np.random.Generator | None) -> Float64:
-        """Return (H, W) metres by which folds raise the unrolled cloth. random: None for the same on both sides."""
+        """Return (H, W) metres by which folds raise the cloth. random: None for the same on both sides."""
         around, along = self._grid()
         raised = np.zeros(around.shape)
         for sign in (1, -1) if self.whole else (1,):
@@ -190,7 +191,14 @@ class Tube:
                     knots = knots + random.uniform(-JITTER, JITTER, knots.shape)
                     strength = random.uniform(*STRENGTHS)
                 for shift in (-self.turn, 0.0, self.turn):
-                    _raise(raised, around, along, knots + (shift, 0.0), WIDER * width, strength * self.higher * HIGHER * height)
+                    _raise(
+                        raised,
+                        around,
+                        along,
+                        knots + np.array([shift, 0.0]),
+                        WIDER * width,
+                        strength * self.higher * HIGHER * height,
+                    )
         return raised
 
     def _grid(self) -> tuple[Float64, Float64]:
@@ -222,13 +230,16 @@ def _raise(
     below = places[:, 1] > path[row, 1]
     level = np.ptp(path[:, 0]) > np.ptp(path[:, 1])  # upright folds are the same on both sides
     wide = width * np.where(below & level, SHARPER, 1.0)
-    raised[near] += height * np.sin(np.pi * np.clip(share[row], 0.02, 0.98)) ** 0.8 * np.exp(-((away / wide) ** 2))
+    raised[near] += (
+        height * np.sin(np.pi * np.clip(share[row], 0.02, 0.98)) ** 0.8 * np.exp(-((away / wide) ** 2))
+    )
 
 
 def trunk_and_sleeves() -> tuple[Tube, ...]:
     """Return the tubes of the shirt: the trunk, the left and the right sleeve."""
+    above = np.array([0, 1.53, -0.035])
     return (
-        Tube(np.array([0, 1.53, -0.035]), np.array([0, 0.9, -0.035]), 0.15, 0.62, TRUNK_FOLDS, (512, 40), whole=True),
+        Tube(above, above - (0, 0.63, 0), 0.15, 0.62, TRUNK_FOLDS, (512, 40), whole=True),
         Tube(SHOULDER, ELBOW, 0.056, 0.20, SLEEVE_FOLDS, (230, 740)),
         Tube(SHOULDER, ELBOW, 0.056, 0.20, SLEEVE_FOLDS, (794, 740), -1.0),
     )  # fmt: skip
@@ -251,7 +262,9 @@ def sew(name: str, garment: Garment) -> Garment:
     left = middle[:, 0] > 0
     if name == "trousers":
         return fold(garment, legs(), np.where(left, 0, 1), _trouser_seams)
-    arm = garment.weights[:, [NAMES.index(f"{side}_{joint}") for side in "lr" for joint in ("shoulder", "elbow")]]
+    arm = garment.weights[
+        :, [NAMES.index(f"{side}_{joint}") for side in "lr" for joint in ("shoulder", "elbow")]
+    ]
     sleeve = arm.sum(axis=1)[garment.triangles].mean(axis=1) > 0.5
     return fold(garment, trunk_and_sleeves(), np.where(sleeve, np.where(left, 1, 2), 0), _shirt_seams)
 
@@ -260,7 +273,11 @@ def _shirt_seams(p: Float64, tube: int) -> Float64:
     """Return (N,) metres from points (N, 3) to the nearest stitches of the shirt."""
     if tube:
         return np.minimum(np.abs(length_inside_sleeve(p) - 0.018), np.abs(_beyond_armhole(p) - ARMHOLE))
-    lines = np.abs(depth_below_collar(p) - 0.016), np.abs(p[:, 1] - HEM - 0.020), np.abs(_beyond_armhole(p) - ARMHOLE)
+    lines = (
+        np.abs(depth_below_collar(p) - 0.016),
+        np.abs(p[:, 1] - HEM - 0.020),
+        np.abs(_beyond_armhole(p) - ARMHOLE),
+    )
     return np.min(lines, axis=0)
 
 
@@ -302,7 +319,9 @@ def fold(
         texels[own == number] = tube.texels(flat[own == number])
     places = texels / SIZE
     picture = _paint(garment, tubes, own, places, edges)
-    keys = np.concatenate([garment.triangles.reshape(-1, 1), np.rint(places.reshape(-1, 2) * SIZE * 64)], axis=1)
+    keys = np.concatenate(
+        [garment.triangles.reshape(-1, 1), np.rint(places.reshape(-1, 2) * SIZE * 64)], axis=1
+    )
     unique, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     rows = unique[:, 0].astype(int)
     folded.colours[:, :3] /= WHITE
@@ -320,7 +339,11 @@ def fold(
 
 
 def _paint(
-    garment: Garment, tubes: tuple[Tube, ...], own: Int64, places: Float64, edges: Callable[[Float64, int], Float64]
+    garment: Garment,
+    tubes: tuple[Tube, ...],
+    own: Int64,
+    places: Float64,
+    edges: Callable[[Float64, int], Float64],
 ) -> bytes:
     """Return the picture: cloth as light from above shows its folds, darker along seams."""
     image = np.full((SIZE, SIZE), WHITE)

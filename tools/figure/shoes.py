@@ -102,7 +102,9 @@ def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64, Float64, Float64]:
     colours.append(LEATHER)
     rings = [np.concatenate([ring, ring[:1]]) for ring in rings]  # the picture has a seam there
     stacked = np.concatenate(rings)
-    along = np.concatenate([[0], np.cumsum([np.linalg.norm(b - a, axis=1).mean() for a, b in pairwise(rings)])])
+    along = np.concatenate(
+        [[0], np.cumsum([np.linalg.norm(b - a, axis=1).mean() for a, b in pairwise(rings)])]
+    )
     share = np.arange(SEGMENTS + 1) / SEGMENTS
     places = np.stack([np.tile(share, len(rings)), np.repeat(along / along[-1], SEGMENTS + 1)], axis=1)
     places = np.concatenate([places * 0.98 + 0.01, [[0.5, 0.0]]])
@@ -145,7 +147,8 @@ def _paint(marks: Float64, triangles: Int64, places: Float64) -> bytes:
 
     colour = np.tile(LEATHER, (len(side), 1))
     for part, tone in (
-        (smoothstep((forward - 0.80 + 25 * side**2) / 0.006), 1.35), (smoothstep((0.20 - forward) / 0.006), 1.35),
+        (smoothstep((forward - 0.80 + 25 * side**2) / 0.006), 1.35),
+        (smoothstep((0.20 - forward) / 0.006), 1.35),
         (smoothstep((0.011 - above) / 0.001), 0.8),
     ):  # fmt: skip
         colour *= (1 + (tone - 1) * part)[:, None]

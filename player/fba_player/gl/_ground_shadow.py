@@ -1,9 +1,9 @@
-"""The shadows of bodies on the ground, and on bodies, from a large key light and the sky: maps that shaders draw.
+"""The shadows of bodies on ground and bodies, from a large key light and the sky: maps that shaders draw.
 
-The first pass draws all triangles as the key light and the sky see them, and keeps how near the ground the lowest
-of them is, and how high what the key light reaches first: bodies are in the shade below that. What is around each
-piece of ground comes from halved copies. The second pass finds the ground's darkness: the nearer what hides the
-light, the sharper. The third draws it.
+The first passes draw all triangles as the key light and the sky see them. Of the former they keep how high what
+it reaches first is: bodies are in the shade below that; of the latter how near the ground the lowest is. What is
+around each piece of ground comes from halved copies. The next pass finds the ground's darkness: the nearer what
+hides the light, the sharper. The last draws it.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class GroundShadow:
     def _find(
         self, casting: list[FaceMesh], low: tuple[float, float], width: float
     ) -> tuple[float, float, float]:
-        """Find the darkness of the ground from `low` on, and return the frame of the map that the light sees."""
+        """Find the darkness of the ground from `low` on, and return the frame of the key light's map."""
         import moderngl
 
         gl = self._gl
@@ -159,8 +159,8 @@ class GroundShadow:
 
     def close(self) -> None:
         for part in (
-            *self._thrown_parts, *self._arrays.values(), *self._programs.values(), self._square, *self._seen.values(),
-            self._shaded, self._heights, self._tops, self._darkness,
+            *self._thrown_parts, *self._arrays.values(), *self._programs.values(), self._square,
+            *self._seen.values(), self._shaded, self._heights, self._tops, self._darkness,
         ):  # fmt: skip
             part.release()
 
@@ -178,8 +178,7 @@ def _casts(mesh: FaceMesh) -> bool:
 
 
 def _frame_around(points: Float32) -> tuple[float, float, float]:
-    """Return the corner of the square that the key light sees around points (N, 3), along its axes, and what
-    share of it a metre is."""
+    """Return the corner of the square that the key light sees about points (N, 3), a metre's share of it."""
     seen = points @ BEFORE
     least, most = seen.min(axis=0), seen.max(axis=0)
     width = FRAMED * float(np.ceil((most - least).max() / FRAMED + 0.4))
