@@ -27,8 +27,8 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
-INSIDE = 0.95
-"""Brightness of the inside of sleeves, hems and collar, relative to the cloth."""
+INSIDE = 2.2
+"""Brightness of the inside of sleeves, hems and collar, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.932, 0.982
 TURN_UP = (0.066, 0.48)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""

@@ -1,9 +1,9 @@
 """The shadows of bodies on ground and bodies, from a large key light and the sky: maps that shaders draw.
 
-The first passes draw all triangles as the key light and the sky see them. Of the former they keep how high what
-it reaches first is: bodies are in the shade below that; of the latter how near the ground the lowest is. What is
-around each piece of ground comes from halved copies. The next pass finds the ground's darkness: the nearer what
-hides the light, the sharper. The last draws it.
+The first passes draw all triangles as the key light and the sky see them. Of the former they keep how high
+what it reaches first is: bodies are in the shade below that; of the latter how near the ground the lowest
+is. What is around each piece of ground comes from halved copies. The next pass finds the ground's darkness:
+the nearer what hides the light, the sharper. The last draws it.
 """
 
 from __future__ import annotations
