@@ -27,8 +27,8 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
-SEAM, INSIDE = 0.88, 0.6
-"""Brightness of the bands along collar and hems, and of the folds there, relative to the cloth."""
+INSIDE = 2.2
+"""Brightness of the inside of sleeves, hems and collar, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.932, 0.982
 TURN_UP = (0.066, 0.48)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
@@ -44,15 +44,9 @@ NECKLINE = (
     (1.4982, 1.4762, 1.4652, 1.4762, 1.4982, 1.5122, 1.5172, 1.5122),
 )
 """Degrees from the front about the neck, and the height of the collar there."""
-FOLDED = 0.0062
-"""Height of folds, metres."""
-WAIST_FOLDS, KNEE, CROTCH = 1.015, 0.505, 0.845
-"""Heights about which they lie, metres."""
-ARMPIT = (0.155, 1.315)
-"""x and y from which those of the shirt spread, metres."""
-FOLD = 0.003
-"""Metres by which an edge is folded in below the skin."""
-HEMMED, STITCHED = 0.0016, 0.0007
+FOLD, DEEP = 0.003, 0.022
+"""Metres by which the inside of an edge reaches below the skin, and back under the cloth."""
+HEMMED, STITCHED = 0.0018, 0.0006
 """Metres by which cloth stands out where it is doubled along an edge, and by which stitches draw it in."""
 ROUNDED = ((0.0012, -0.0003), (0.0021, -0.0014), (0.0020, -0.0028))
 """Rows that round an edge: metres beyond it, and outwards."""
@@ -63,7 +57,8 @@ class Garment:
     """A garment: vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J).
 
     covered: depth of each vertex of the person under the garment, metres; negative where it is free.
-    inside (V,): mask of vertices folded in at an edge, which is a crease.
+    inside (V,): mask of vertices folded in at an edge, which is a crease. within (V,): metres from the edge.
+    places (V, 2): of vertices in `picture`, a JPEG file, 0..1 from its left and upper edge.
     """
 
     vertices: Float64
@@ -72,6 +67,9 @@ class Garment:
     weights: Float64
     covered: Float64
     inside: Bool
+    within: Float64
+    places: Float64 | None = None
+    picture: bytes | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,30 +99,6 @@ def height_above_hem(p: Float64) -> Float64:
     return p[:, 1] - TURN_UP[0] - TURN_UP[1] * np.clip(p[:, 2] - LEG, -0.05, 0.09)
 
 
-def shirt_folds(p: Float64) -> Float64:
-    """Return (N,) metres by which folds raise the shirt at points (N, 3): from armpits, and at the waist."""
-    x, y, z = np.abs(p[:, 0]), p[:, 1], p[:, 2]
-    waist = np.exp(-(((y - WAIST_FOLDS) / 0.055) ** 2)) * smoothstep((x - 0.03) / 0.08)
-    slanted = y + 0.35 * x * np.where(z > AXIS - 0.03, 1.0, -0.6)
-    away = np.hypot(x - ARMPIT[0], y - ARMPIT[1])
-    turn = np.arctan2(y - ARMPIT[1], ARMPIT[0] - x)
-    pull = smoothstep((away - 0.02) / 0.04) * np.exp(-((away / 0.11) ** 2)) * (x < ARMPIT[0] + 0.02)
-    pull *= smoothstep((ARMPIT[1] + 0.03 - y) / 0.05)
-    return FOLDED * (waist * np.sin(slanted * 2 * np.pi / 0.046) + 1.2 * pull * np.cos(7.0 * turn + 0.6))
-
-
-def trouser_folds(p: Float64) -> Float64:
-    """Return (N,) metres by which folds raise the trousers at points (N, 3): crotch, knees, ankles."""
-    x, y, z = np.abs(p[:, 0]), p[:, 1], p[:, 2]
-    behind = 0.35 + 0.65 * smoothstep((LEG + 0.05 - z) / 0.06)
-    knee = np.exp(-(((y - KNEE) / 0.07) ** 2)) * behind * np.sin((y + 0.3 * x) * 2 * np.pi / 0.042)
-    stack = np.exp(-(((y - 0.13) / 0.06) ** 2)) * np.sin((y + 0.45 * z) * 2 * np.pi / 0.058)
-    away = np.hypot(x, y - CROTCH)
-    turn = np.arctan2(y - CROTCH, x + 1e-6)
-    pull = smoothstep((away - 0.03) / 0.05) * np.exp(-((away / 0.14) ** 2)) * np.cos(9.0 * turn)
-    return FOLDED * (knee + 0.9 * stack + 0.8 * pull)
-
-
 def make_shirt(body: Body) -> Garment:
     """Return a T-shirt."""
     p = body.person.vertices
@@ -138,10 +112,9 @@ def make_shirt(body: Body) -> Garment:
     kind = np.where(arms, 0, np.where(p[:, 1] > 1.25, 1, 2))
     loose = smoothstep((1.30 - p[:, 1]) / 0.25)
     thick = (
-        0.0046 + 0.0045 * loose * ~arms + 0.004 * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
+        0.0046 + 0.0075 * loose * ~arms + 0.0075 * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
     )
-    thick += np.maximum(shirt_folds(p) * ~arms, -0.003)
-    return _make_garment(body, edge_distance, kind, thick, 0.35 + 0.45 * loose, 8, SHIRT, 0.014)
+    return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.4 * loose, 14, SHIRT, 0.014)
 
 
 def make_trousers(body: Body) -> Garment:
@@ -160,7 +133,6 @@ def make_trousers(body: Body) -> Garment:
         + 0.0105 * below
         + 0.006 * smoothstep((0.35 - p[:, 1]) / 0.25)
     )
-    thick += np.maximum(trouser_folds(p), 0.0012 - thick)
     return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
 
 
@@ -210,7 +182,7 @@ def _make_garment(
     )  # a millimetre away from the cloth
     beyond /= np.maximum(np.linalg.norm(beyond, axis=1, keepdims=True), 1e-9)
     rows = [vertices[rim] + along * beyond + out * outward[rim] for along, out in ROUNDED]
-    rows.append(vertices[rim] - outward[rim] * (thickness[rim] + HEMMED + FOLD)[:, None])
+    rows.append(vertices[rim] - DEEP * beyond - outward[rim] * (thickness[rim] + HEMMED + FOLD)[:, None])
     count = len(rim)
     place = {vertex: len(vertices) + k for k, vertex in enumerate(rim.tolist())}
     loop = np.array([[a, b, place[a], place[b]] for a, b in cloth.border.tolist()])
@@ -224,13 +196,14 @@ def _make_garment(
     weights = np.concatenate([cloth.weights, *[cloth.weights[rim]] * len(rows)])
     everything = np.concatenate([vertices, *rows])
     across = np.concatenate([cloth.values[:, 0], *[cloth.values[rim, 0]] * len(rows)])
-    shade = np.where(across[faces].max(axis=1) < band + 1e-6, SEAM, 1.0)
-    shade[inner] = INSIDE
+    shade = np.where(inner, INSIDE, 1.0)
     side = np.concatenate([cloth.vertices[:, 0], *[cloth.vertices[rim, 0]] * len(rows)])
-    everything, weights, faces, shade = _mirror(everything, weights, faces, shade, side)
-    everything, weights, faces, tone = _split_by_shade(everything, weights, faces, shade)
+    values = np.concatenate([weights, across[:, None]], axis=1)
+    everything, values, faces, shade = _mirror(everything, values, faces, shade, side)
+    everything, values, faces, tone = _split_by_shade(everything, values, faces, shade)
+    weights, within = values[:, :-1], values[:, -1]
     colours = np.concatenate([tone[:, None] * colour, np.full((len(tone), 1), 0.06)], axis=1)
-    return Garment(everything, faces, colours, weights, value, tone == INSIDE)
+    return Garment(everything, faces, colours, weights, value, tone == INSIDE, within)
 
 
 def _move_onto_edge(positions: Float64, level: float, edge_distance: Callable[[Float64], Float64]) -> Float64:
@@ -262,13 +235,17 @@ def _even_rim(vertices: Float64, border: Int64, rim: Int64) -> Float64:
 def _mirror(
     vertices: Float64, weights: Float64, faces: Int64, shade: Float64, side: Float64
 ) -> tuple[Float64, Float64, Int64, Float64]:
-    """Return the left half and its mirror image. side (V,): x of the vertices before smoothing."""
+    """Return the left half and its mirror image. side (V,): x of the vertices before smoothing.
+
+    weights (V, J + N): of the joints, and values that are the same on both sides.
+    """
     half = (side[faces] > -MIDLINE).all(axis=1)
     used, left = np.unique(faces[half], return_inverse=True)
     left = left.reshape(-1, 3)
     middle = np.abs(side[used]) < MIDLINE
     positions, carried = vertices[used].copy(), weights[used].copy()
-    other = carried[:, MIRROR]
+    other = carried.copy()
+    other[:, : len(MIRROR)] = carried[:, MIRROR]
     positions[middle, 0] = 0.0
     carried[middle] = (carried[middle] + other[middle]) / 2
     number = np.arange(len(used))

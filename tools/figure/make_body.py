@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import clothes
+import folds
 import numpy as np
 import rig
 import shoes
@@ -56,7 +57,8 @@ SKULL_ALONE = 0.9
 class Piece:
     """One mesh of the body in the posture of the figure.
 
-    vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J), normals (V, 3).
+    vertices (V, 3), triangles (F, 3), colours (V, 4), weights (V, J), normals (V, 3). texcoords (V, 2) in the
+    picture of the cloth, or None.
     """
 
     kind: str
@@ -65,6 +67,8 @@ class Piece:
     colours: Float64
     weights: Float64
     normals: Float64
+    texcoords: Float64 | None = None
+    picture: bytes | None = None
 
 
 def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
@@ -91,10 +95,10 @@ def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
         "neck": _piece("neck", _neck(surface, of_tile == 0, bones), colour),
     }
     for name, garment in made.items():
-        kind = "shoe" if name == "shoes" else "cloth"
+        sewn = folds.sew(name, garment)
         pieces[name] = Piece(
-            kind, garment.vertices, garment.triangles, garment.colours, garment.weights,
-            _welded_normals(garment),
+            "shoe" if name == "shoes" else "cloth", sewn.vertices, sewn.triangles, sewn.colours, sewn.weights,
+            _welded_normals(sewn), sewn.places, sewn.picture,
         )  # fmt: skip
     pieces["skin"].colours[:, :3] *= _flush_factors(pieces["skin"], bones)
     _paint_nails(pieces["skin"], bones)
@@ -214,7 +218,8 @@ def model() -> BodyModel:
             BodyPart(
                 name, piece.kind, piece.vertices, piece.triangles, joints, weights,
                 normals=piece.normals, colours=np.round(piece.colours * 255) / 255,
-                material=Material(name, (1.0, 1.0, 1.0), roughness),
+                texcoords=piece.texcoords,
+                material=Material(name, (1.0, 1.0, 1.0), roughness, texture=piece.picture),
             )
         )  # fmt: skip
     points = FaceModel.default().points[[point_rows()["3.5"], point_rows()["3.6"]]]

@@ -136,6 +136,13 @@ def encode_jpeg(picture: Image.Image, quality: int = 86) -> bytes:
     return buffer.getvalue()
 
 
+def encode_linear(light: Float64, quality: int = 88) -> bytes:
+    """Return linear light (H, W) or (H, W, 3), 0..1, as a JPEG file."""
+    light = np.clip(light, 0, 1)
+    shown = np.where(light <= 0.0031308, light * 12.92, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
+    return encode_jpeg(Image.fromarray(np.rint(shown * 255).astype(np.uint8)), quality)
+
+
 def _blend(colour: Float64, other: Float64, share: Float64) -> Float64:
     return colour + (other - colour) * np.clip(share, 0, 1)[:, None]
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from clothes import MIRROR, Garment
 from meshes import tube
+from paint import encode_linear, make_chart
 
 from fba.arrays import Float64, Int64
 from fba.mesh import vertex_normals
@@ -12,6 +15,10 @@ from fba.sampling import smoothstep
 
 LEATHER = np.array([0.030, 0.026, 0.024])
 SOLE = np.array([0.42, 0.41, 0.39])
+LACE = np.array([0.48, 0.47, 0.45])
+LACES = 5
+PICTURE = 512
+"""Texels of the picture along each side."""
 SEGMENTS = 44
 CLEARANCE = 0.007
 """Metres between foot and outline."""
@@ -30,7 +37,7 @@ def make_shoes(body: Float64, weights: Float64) -> Garment:
     """Return both shoes for a person. body: (V, 3), vertices as modelled. weights: (V, J), of the joints."""
     left = body[:, 0] > 0
     foot = np.flatnonzero(left & (body[:, 1] < TOP_HEIGHT + 0.01))
-    vertices, triangles, colours = _shoe(body[foot])
+    vertices, triangles, colours, places, marks = _shoe(body[foot])
     left_weights = _nearest_weights(vertices, body[foot], weights[foot])
     other = vertices * (-1.0, 1.0, 1.0)
     return Garment(
@@ -40,11 +47,17 @@ def make_shoes(body: Float64, weights: Float64) -> Garment:
         np.concatenate([left_weights, left_weights[:, MIRROR]]),
         np.where(body[:, 1] < TOP_HEIGHT + 0.01, COVERED_HEIGHT - body[:, 1], -1.0),
         np.zeros(2 * len(vertices), dtype=bool),
+        np.ones(2 * len(vertices)),
+        np.concatenate([places, places]),
+        _paint(marks, triangles, places),
     )
 
 
-def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
-    """Return vertices, triangles and colours of the left shoe around the vertices of a foot."""
+def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64, Float64, Float64]:
+    """Return vertices, triangles, colours, places in the picture, and marks, of the left shoe around a foot.
+
+    The marks (V, 3): metres to the side of the middle, share of the length from the heel, and height (m).
+    """
     sole_vertices = foot[foot[:, 1] < 0.05]
     toe_axis, origin = _direction(sole_vertices)
     side_axis = np.array([toe_axis[2], 0.0, -toe_axis[0]])
@@ -87,24 +100,83 @@ def _shoe(foot: Float64) -> tuple[Float64, Int64, Float64]:
         np.stack([*(middle + (top - middle) * 0.6).T, np.full(SEGMENTS, TOP_HEIGHT - 0.004)], axis=1)
     )
     colours.append(LEATHER)
+    rings = [np.concatenate([ring, ring[:1]]) for ring in rings]  # the picture has a seam there
     stacked = np.concatenate(rings)
+    along = np.concatenate(
+        [[0], np.cumsum([np.linalg.norm(b - a, axis=1).mean() for a, b in pairwise(rings)])]
+    )
+    share = np.arange(SEGMENTS + 1) / SEGMENTS
+    places = np.stack([np.tile(share, len(rings)), np.repeat(along / along[-1], SEGMENTS + 1)], axis=1)
+    places = np.concatenate([places * 0.98 + 0.01, [[0.5, 0.0]]])
+    length = np.ptp(outline[:, 1])
+    marks = np.stack([
+        stacked[:, 0] - np.interp(stacked[:, 1], *_spine(outline)),
+        (stacked[:, 1] - outline[:, 1].min()) / length, stacked[:, 2],
+    ], axis=1)  # fmt: skip
+    marks = np.concatenate([marks, [[0.0, 0.5, 0.0]]])
     vertices = (
         origin + stacked[:, :1] * side_axis + stacked[:, 1:2] * toe_axis + stacked[:, 2:] * (0.0, 1.0, 0.0)
     )
-    vertex_colours = np.repeat(np.array(colours), SEGMENTS, axis=0)
-    triangles = tube(len(rings), SEGMENTS)[:, ::-1]
+    vertex_colours = np.repeat(np.array(colours), SEGMENTS + 1, axis=0)
+    triangles = tube(len(rings), SEGMENTS + 1)[:, ::-1]
+    triangles = triangles[np.ptp(triangles % (SEGMENTS + 1), axis=1) < SEGMENTS]
     # The bottom is a fan around the middle of the lowest ring.
     bottom = len(vertices)
     centre = vertices[:SEGMENTS].mean(axis=0) * (1, 0, 1)
     vertices = np.concatenate([vertices, centre[None]])
-    vertex_colours = np.concatenate([vertex_colours, SOLE[None] * 0.5])
+    vertex_colours = np.concatenate([vertex_colours, SOLE[None]])
     k = np.arange(SEGMENTS)
-    fan = np.stack([np.full(SEGMENTS, bottom), (k + 1) % SEGMENTS, k], axis=1)
+    fan = np.stack([np.full(SEGMENTS, bottom), k + 1, k], axis=1)
     triangles = np.concatenate([triangles, fan])
     inside = (outward_components(vertices, triangles) < 0).mean() > 0.5
     triangles = triangles[:, ::-1] if inside else triangles
-    gloss = np.where(vertex_colours[:, :1] < 0.1, 0.34, 0.10)
-    return vertices, triangles, np.concatenate([vertex_colours, gloss], axis=1)
+    gloss = np.where(vertex_colours[:, :1] < 0.1, 0.30, 0.10)
+    return vertices, triangles, np.concatenate([np.ones_like(vertex_colours), gloss], axis=1), places, marks
+
+
+def _paint(marks: Float64, triangles: Int64, places: Float64) -> bytes:
+    """Return the picture of a shoe: sole, leather with caps, seams and eyelets, tongue and laces."""
+    uvs = (places * (1, -1) + (0, 1))[triangles]
+    chart = make_chart(marks, np.zeros((len(marks), 0)), triangles, uvs, PICTURE)
+    side, forward, height = chart.positions_at[chart.known].T
+    away = np.abs(side)
+    above = height - SOLE_HEIGHT - TOE_SPRING * smoothstep((forward - 0.70) / 0.30) ** 1.5
+
+    def line(distance: Float64, half: float) -> Float64:
+        return np.exp(-((distance / half) ** 2))
+
+    colour = np.tile(LEATHER, (len(side), 1))
+    for part, tone in (
+        (smoothstep((forward - 0.80 + 25 * side**2) / 0.006), 1.35),
+        (smoothstep((0.20 - forward) / 0.006), 1.35),
+        (smoothstep((0.011 - above) / 0.001), 0.8),
+    ):  # fmt: skip
+        colour *= (1 + (tone - 1) * part)[:, None]
+    placket = np.abs(away - 0.021 - 0.012 * (0.72 - forward))
+    laced = (forward > 0.36) & (forward < 0.715) & (above > 0.02)
+    seams = np.min([
+        np.abs(forward - 0.80 + 25 * side**2) * 0.27, np.abs(forward - 0.20) * 0.27,
+        np.where(laced | (forward < 0.72), placket, 1.0), np.abs(above - 0.011),
+    ], axis=0)  # fmt: skip
+    colour *= (1 - 0.5 * line(seams, 0.0009) + 0.5 * line(seams - 0.0028, 0.0008))[:, None]
+    tongue = laced & (away < 0.021 + 0.012 * (0.72 - forward))
+    colour[tongue] = LEATHER * 0.75
+    step = (forward - 0.36) / 0.355 * LACES
+    slant = step + 0.35 * side / 0.03 * np.where(np.floor(step) % 2 == 0, 1, -1) * 0.4
+    lace = laced & (away < 0.030)
+    across = np.abs(slant - np.floor(slant) - 0.5) * 0.355 / LACES * 0.27
+    share = (smoothstep((0.0034 - across) / 0.0008) * lace)[:, None]
+    colour = colour * (1 - share) + LACE * (0.75 + 0.25 * line(across, 0.002)[:, None]) * share
+    shadow = line(across - 0.0046, 0.0012) * lace
+    colour *= (1 - 0.5 * shadow)[:, None]
+    grooves = line(np.abs(above + 0.006), 0.0010) + line(np.abs(above + 0.0125), 0.0008)
+    sole = SOLE * (1 - 0.45 * np.minimum(grooves, 1))[:, None]
+    sole = np.where((above < -0.0125)[:, None], SOLE * 0.55, sole)
+    colour = np.where((above < 0.0002)[:, None], sole, colour)
+    image = np.zeros((PICTURE, PICTURE, 3)) + LEATHER
+    image[chart.known] = colour
+    image[np.arange(PICTURE) < 0.012 * PICTURE] = SOLE * 0.5
+    return encode_linear(image, 88)
 
 
 def outward_components(vertices: Float64, triangles: Int64) -> Float64:

@@ -31,8 +31,8 @@ TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
 MAX_HAIR_WIDTH = 0.0012
 """Strips wider than this (m) are not single hairs."""
-RELIEF_STRENGTH = 0.60
-"""Strength of the skin's relief."""
+RELIEF_STRENGTHS = {"skin": 0.60, "cloth": 0.22}
+"""Strength of the relief of skin and of woven cloth."""
 NECK_LENGTH = 2.3
 """Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""
 MAX_BENT_SHARE = 0.1
@@ -232,11 +232,11 @@ def join_pieces(edges: Intp, count: int) -> Intp:
 
 
 def _relief(part: Part) -> tuple[float, float]:
-    """Return the strength of the skin's relief and its repetitions, so that each is `RELIEF` metres wide."""
-    if part.kind != "skin" or part.texcoords is None or not len(part.triangles):
+    """Return the strength of a part's relief and its repetitions, so that each is `RELIEF` metres wide."""
+    if part.kind not in RELIEF_STRENGTHS or part.texcoords is None or not len(part.triangles):
         return (0.0, 1.0)
     metres = texture_breadth(part.vertices, part.texcoords, part.triangles)
-    return (RELIEF_STRENGTH, min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
+    return (RELIEF_STRENGTHS[part.kind], min(metres / RELIEF, 200.0)) if metres > 0 else (0.0, 1.0)
 
 
 def _is_smooth(part: Part) -> bool:

@@ -1,7 +1,7 @@
-"""How much light reaches a body past its folds, and the limbs that keep light from it as it moves.
+"""How much light reaches a body past its folds, and the limbs that keep the sky from it as it moves.
 
 Occlusion by folds is computed once, in the bind pose. Limbs, trunk and head count as capsules between
-joints; what they hide of the sky and of the key light is computed where the body is drawn (face.vert).
+joints; what they hide of the sky is computed where the body is drawn (face.vert), and so are shadows.
 """
 
 from __future__ import annotations

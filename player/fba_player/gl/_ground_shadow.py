@@ -1,33 +1,48 @@
-"""The shadow of bodies on the ground, from a large key light and the sky: a map that shaders draw.
+"""The shadows of bodies on ground and bodies, from a large key light and the sky: maps that shaders draw.
 
-The first pass throws all triangles onto the ground, along the key light and straight down, and keeps how near
-the ground the lowest of them is; what is around each piece of ground comes from halved copies of that. The
-second finds the darkness: the nearer what hides the light, the sharper. The third draws it on the ground.
+The first passes draw all triangles as the key light and the sky see them. Of the former they keep how high
+what it reaches first is: bodies are in the shade below that; of the latter how near the ground the lowest
+is. What is around each piece of ground comes from halved copies. The next pass finds the ground's darkness:
+the nearer what hides the light, the sharper. The last draws it.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fba.arrays import Float32, Int32, Intp, UInt8
+from fba.rotations import unit
 from fba_player._figure.face_light import KEY_DIRECTION
 from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniform, write_buffer
 from fba_player.view._view import FaceMesh, FaceShape
 
-HEIGHTS = 256
-"""Texels of the map of heights along each side."""
+TEXELS = 256
+"""Texels along each side of the maps that the sky and the key light see."""
+HALVINGS = 5
+"""How often the maps are halved."""
 CELLS = 64
 """Texels of the darkness along each side."""
+FRAMED = 0.25
+"""Metres: in steps of these, the map that the key light sees is larger than what throws shadows."""
 WIDTH = 4.8
 """Metres of ground, along each side, for one body."""
+ACROSS = unit(np.array([KEY_DIRECTION[2], 0.0, -KEY_DIRECTION[0]]))
+BEFORE = np.stack([ACROSS, np.cross(unit(np.array(KEY_DIRECTION)), ACROSS)], axis=1).astype(np.float32)
+"""(3, 2): axes of the map that the key light sees, as in shaders/lighting.glsl."""
 INNER_KINDS = ("teeth", "tongue", "mouth", "eye")
 """Kinds of parts that lie inside others and cast no shadow."""
-INSTANCES = 2
-"""Lights along which triangles are thrown: the key light and the sky."""
 CACHED_SHAPES = 512
 """Number of shapes whose casting vertices are cached."""
+
+
+class Shade(NamedTuple):
+    """A map of heights that the key light reaches first. frame: as in the shaders. finely: for each pixel."""
+
+    tops: Any
+    frame: tuple[float, float, float]
+    finely: bool = False
 
 
 class GroundShadow:
@@ -35,12 +50,13 @@ class GroundShadow:
 
     def __init__(self, context: Any) -> None:
         self._gl = context
-        self._heights = context.texture((HEIGHTS, HEIGHTS), 4, dtype="f2")
+        self._heights = context.texture((TEXELS, TEXELS), 2, dtype="f2")
+        self._tops = context.texture((TEXELS, TEXELS), 4, dtype="f4")
         self._darkness = context.texture((CELLS, CELLS), 1, alignment=1)
         self._darkness.filter = (context.LINEAR, context.LINEAR)
-        for texture in (self._heights, self._darkness):
+        for texture in (self._heights, self._tops, self._darkness):
             texture.repeat_x = texture.repeat_y = False
-        self._thrown = context.framebuffer([self._heights])
+        self._seen = {map_: context.framebuffer([map_]) for map_ in (self._tops, self._heights)}
         self._shaded = context.framebuffer([self._darkness])
         self._shapes = RecentlyUsed[tuple[Intp, Int32]](CACHED_SHAPES, lambda _: None)
         self._thrown_parts: list[Any] = []
@@ -52,17 +68,17 @@ class GroundShadow:
             for name in ("shaded", "cast")
         }
 
-    def draw(self, meshes: list[FaceMesh], places: Float32, camera: bytes) -> bool:
+    def draw(self, meshes: list[FaceMesh], places: Float32, camera: bytes) -> Shade | None:
         """Draw the shadow of meshes around `places` (N, 2), x and z, into the bound framebuffer.
 
-        camera: the matrix to clip space. Returns whether there are any that cast one.
+        camera: the matrix to clip space. Returns the map of shadows, or None if no mesh casts any.
         """
         casting = [mesh for mesh in meshes if _casts(mesh)]
         if not casting:
-            return False
+            return None
         gl, target, viewport = self._gl, self._gl.fbo, self._gl.viewport
         low, width = _ground_around(places)
-        self._find(casting, low, width)
+        frame = self._find(casting, low, width)
         target.use()
         gl.viewport = viewport
         gl.enable_only(gl.BLEND)
@@ -71,40 +87,51 @@ class GroundShadow:
         for name, value in (("camera", camera), ("low", low), ("width", width)):
             set_uniform(self._programs["cast"], name, value)
         self._arrays["cast"].render(gl.TRIANGLE_STRIP)
-        return True
+        return Shade(self._tops, frame)
 
     def darkness(self, meshes: list[FaceMesh], places: Float32) -> UInt8:
         """Return uint8 (CELLS, CELLS): the darkness of the ground that `draw` draws, rows along z."""
         self._find([mesh for mesh in meshes if _casts(mesh)], *_ground_around(places))
         return np.frombuffer(self._darkness.read(alignment=1), np.uint8).reshape(CELLS, CELLS)
 
-    def _find(self, casting: list[FaceMesh], low: tuple[float, float], width: float) -> None:
-        """Find the darkness of the ground from `low` on."""
+    def _find(
+        self, casting: list[FaceMesh], low: tuple[float, float], width: float
+    ) -> tuple[float, float, float]:
+        """Find the darkness of the ground from `low` on, and return the frame of the key light's map."""
         import moderngl
 
         gl = self._gl
-        self._thrown.use()
-        gl.viewport = (0, 0, HEIGHTS, HEIGHTS)
-        gl.clear(0.0, 0.0, 0.0, 0.0)
+        thrown, shaded = self._programs["thrown"], self._programs["shaded"]
+        frame = self._place(casting) if casting else (0.0, 0.0, 1.0)
+        for program in (thrown, shaded):
+            for name, value in (("low", low), ("width", width), ("frame", frame)):
+                set_uniform(program, name, value)
         gl.enable_only(gl.BLEND)
         gl.blend_func = gl.ONE, gl.ONE
         gl.blend_equation = moderngl.MAX
-        set_uniform(self._programs["thrown"], "low", low)
-        set_uniform(self._programs["thrown"], "width", width)
-        if casting:
-            self._throw(casting)
+        for sky, (texture, framebuffer) in enumerate(self._seen.items()):
+            framebuffer.use()
+            gl.viewport = (0, 0, TEXELS, TEXELS)
+            gl.clear(0.0, 0.0, 0.0, 0.0)
+            set_uniform(thrown, "sky", float(sky))
+            if casting:
+                self._thrown_parts[0].render()
+            texture.build_mipmaps(0, HALVINGS)
+            texture.filter = (gl.LINEAR_MIPMAP_NEAREST, gl.LINEAR)
+            texture.use(1 - sky)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(gl.NOTHING)
-        self._heights.build_mipmaps()
-        self._heights.filter = (gl.LINEAR_MIPMAP_NEAREST, gl.LINEAR)
         self._shaded.use()
         gl.viewport = (0, 0, CELLS, CELLS)
-        self._heights.use(0)
-        set_uniform(self._programs["shaded"], "width", width)
+        set_uniform(shaded, "tops", 1)
         self._arrays["shaded"].render(gl.TRIANGLE_STRIP)
+        return frame
 
-    def _throw(self, casting: list[FaceMesh]) -> None:
-        """Draw all triangles at once: software OpenGL takes longer to begin a part than to draw it."""
+    def _place(self, casting: list[FaceMesh]) -> tuple[float, float, float]:
+        """Write the places of all vertices, and return the frame of the map that the key light sees.
+
+        All triangles are drawn at once: software OpenGL takes longer to begin a part than to draw it.
+        """
         shapes = [mesh.shape for mesh in casting]
         parts = [self._shapes.get(shape, lambda shape=shape: _casting(shape)) for shape in shapes]  # type: ignore[misc]
         if [*map(id, shapes)] != [*map(id, self._thrown_shapes)]:
@@ -114,9 +141,9 @@ class GroundShadow:
             + mesh.matrix[:3, 3].astype(np.float32)
             for mesh, (rows, _) in zip(casting, parts, strict=True)
         ]
-        array, positions, _ = self._thrown_parts
-        write_buffer(positions, np.concatenate(places))
-        array.render(instances=INSTANCES)
+        points = np.concatenate(places)
+        write_buffer(self._thrown_parts[1], points)
+        return _frame_around(points)
 
     def _join(self, shapes: list[FaceShape], parts: list[tuple[Intp, Int32]]) -> None:
         """Make the buffers for the casting vertices of all shapes, one after the other."""
@@ -132,8 +159,8 @@ class GroundShadow:
 
     def close(self) -> None:
         for part in (
-            *self._thrown_parts, *self._arrays.values(), *self._programs.values(), self._square, self._thrown,
-            self._shaded, self._heights, self._darkness,
+            *self._thrown_parts, *self._arrays.values(), *self._programs.values(), self._square,
+            *self._seen.values(), self._shaded, self._heights, self._tops, self._darkness,
         ):  # fmt: skip
             part.release()
 
@@ -148,6 +175,15 @@ def _casts(mesh: FaceMesh) -> bool:
     shape = mesh.shape
     drawn = shape.casts and shape.kind not in INNER_KINDS and len(shape.triangles) > 0
     return drawn and not mesh.turn.any()
+
+
+def _frame_around(points: Float32) -> tuple[float, float, float]:
+    """Return the corner of the square that the key light sees about points (N, 3), a metre's share of it."""
+    seen = points @ BEFORE
+    least, most = seen.min(axis=0), seen.max(axis=0)
+    width = FRAMED * float(np.ceil((most - least).max() / FRAMED + 0.4))
+    u, v = np.floor(((least + most) / 2 - width / 2) * TEXELS / width) * width / TEXELS  # whole texels
+    return float(u), float(v), 1 / width
 
 
 def _ground_around(places: Float32) -> tuple[tuple[float, float], float]:

@@ -10,6 +10,7 @@ from fba.arrays import Float32, Float64, Int32, UInt8
 from fba_player._mesh.textures import RELIEF, skin_relief, texture_breadth
 from fba_player._mesh.wrinkle_map import BOTTOM, TEXELS, TOP, WIDTH, wrinkle_map
 from fba_player._mesh.wrinkle_map import SHAPE as WRINKLE_SHAPE
+from fba_player.gl._ground_shadow import Shade
 from fba_player.gl._lod import distance, share_memory
 from fba_player.gl._resources import (
     RecentlyUsed,
@@ -31,6 +32,8 @@ MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
 MIN_RELIEF = 0.25
 """The skin's relief is not drawn if it is reduced to less than this share of its size."""
+CLEAR, CLEAR_OF_FACES = 0.014, 0.07
+"""Metres by which what throws a shadow on a surface must be off it; faces come with shadows of their own."""
 FAR = -1e4
 """Place (m) along each axis of limbs that a body lacks: away from the light."""
 
@@ -46,9 +49,11 @@ class FaceRenderer:
         self._wrinkles: dict[int, Any] = {}
         self._pixels: UInt8 | None = None
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
+        self._shade: Shade | None = None
 
-    def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
-        """Set the camera: its position (3,), the matrix (4, 4) to clip space, a pixel's size."""
+    def begin(self, eye: Float64, matrix: Float64, pixel: float, shade: Shade | None = None) -> None:
+        """Set the camera: its position (3,), the matrix (4, 4) to clip space, a pixel's size; and shadows."""
+        self._shade = shade
         before = self._camera
         self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
         if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
@@ -140,6 +145,8 @@ class FaceRenderer:
                 ("SMOOTH", shape.smooth),
                 ("HAIRS", shape.across is not None),
                 ("LIMBS", mesh.limbs is not None),
+                ("SHADED", self._shade is not None),
+                ("FINELY", self._shade is not None and self._shade.finely),
                 ("TEXTURED", picture is not None),
                 ("WRINKLED", wrinkles is not None),
                 ("FINE", repeats is not None),
@@ -156,6 +163,11 @@ class FaceRenderer:
             set_uniform(program, "cut", CORE_OPACITY if core else shape.cutoff)
         if mesh.limbs is not None:
             set_uniform(program, "limbs", _padded(mesh.limbs))
+        if self._shade is not None:
+            self._shade.tops.use(3)
+            set_uniform(program, "tops", 3)
+            set_uniform(program, "frame", self._shade.frame)
+            set_uniform(program, "clearance", CLEAR_OF_FACES if mesh.limbs is None else CLEAR)
         if picture is not None:
             picture.use(0)
         if repeats is not None:

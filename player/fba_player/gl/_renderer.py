@@ -12,7 +12,7 @@ from fba.arrays import Float32, Float64, Int32
 from fba_player._mesh.primitives import capsule_mesh, sphere_mesh
 from fba_player.gl._annotation_renderer import ExtrasRenderer
 from fba_player.gl._antialias_region import Steps, find_steps
-from fba_player.gl._ground_shadow import GroundShadow
+from fba_player.gl._ground_shadow import GroundShadow, Shade
 from fba_player.gl._lod import Details
 from fba_player.gl._mesh_renderer import FaceRenderer
 from fba_player.gl._resources import (
@@ -126,7 +126,7 @@ class Renderer:
         gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
         self._set_camera(tuple(eye.tolist()), matrix_bytes(matrix), pixel)
         drawn = replace(view, faces=self._details.choose(view.faces, eye, pixel, view.lod, now))
-        self._draw_studio(drawn, matrix, size, (float(camera.target[0]), float(camera.target[2])))
+        shade = self._draw_studio(drawn, matrix, size, (float(camera.target[0]), float(camera.target[2])))
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
             self._draw_mesh(mesh)
@@ -134,7 +134,7 @@ class Renderer:
         self._draw_marks(view.marks)
         for ball in view.eyes:
             self._draw_eye(ball)
-        self._faces.begin(eye, matrix, pixel)
+        self._faces.begin(eye, matrix, pixel, shade and shade._replace(finely=not smoothed))
         self._faces.draw(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
@@ -178,16 +178,15 @@ class Renderer:
 
     def _draw_studio(
         self, view: View, matrix: Float64, size: tuple[int, int], centre: tuple[float, float]
-    ) -> None:
-        """Draw backdrop and ground, cached for the last camera.
+    ) -> Shade | None:
+        """Draw backdrop and ground, cached for the last camera, and shadows; see `_draw_shadows`.
 
         centre: x and z of the ground's brightest point.
         """
         gl = self._gl
         if view.background is not None:
             gl.clear(*view.background, 1.0, depth=1.0)
-            self._draw_shadows(view, matrix)
-            return
+            return self._draw_shadows(view, matrix)
         target = gl.fbo
         key = (size, view.ground, matrix.tobytes(), centre)
         if self._backdrop is None or self._backdrop[0] != key:
@@ -204,20 +203,22 @@ class Renderer:
         gl.copy_framebuffer(target, self._backdrop[2])
         target.use()
         gl.viewport = (0, 0, *size)
-        self._draw_shadows(view, matrix)
+        return self._draw_shadows(view, matrix)
 
-    def _draw_shadows(self, view: View, matrix: Float64) -> None:
-        """Draw soft shadows on the ground."""
+    def _draw_shadows(self, view: View, matrix: Float64) -> Shade | None:
+        """Draw soft shadows on the ground, and return the map of those on bodies."""
         gl = self._gl
         blobs = np.ascontiguousarray(view.blobs[:MAX_BLOBS], dtype="f4")
         if not view.ground or not len(blobs):
-            return
-        if self._ground_shadow.draw(view.faces, view.blobs[:, :2], matrix_bytes(matrix)):
-            return
+            return None
+        shade = self._ground_shadow.draw(view.faces, view.blobs[:, :2], matrix_bytes(matrix))
+        if shade is not None:
+            return shade
         gl.enable_only(gl.BLEND)
         gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
         self._blobs.write(blobs)
         self._shadow.render(gl.TRIANGLE_STRIP, instances=len(blobs))
+        return None
 
     def _backdrop_buffer(self, size: tuple[int, int]) -> tuple[Any, Any]:
         if self._backdrop is not None:

@@ -27,7 +27,7 @@ Colour = tuple[float, float, float, float]
 """Of annotations: red, green, blue as displayed (sRGB, 0..1), and opacity."""
 
 MOST_LIMBS = 12
-"""Most limbs that keep light from a part; as in shaders/face.vert."""
+"""Most limbs that keep the sky from a part; as in shaders/face.vert."""
 CAPSULE_FLOATS = 16
 """Of a capsule: start (3), radius there, end (3), radius there, front (3), depth, colour (3), gloss."""
 
@@ -152,7 +152,7 @@ class FaceMesh:
     mesh is drawn for, in the mesh's own unit; None if not known. wrinkles: float32 (2, 4), 0..1, strength of
     each wrinkle on the left and the right side; None for none. looks: `FaceShape.looks` in place of the
     shape's own, while one level of detail becomes another. limbs: float32 (2 K, 4), for at most `MOST_LIMBS`
-    limbs that keep light from the part: both ends of each, in the frame of the positions, each with the
+    limbs that keep the sky from the part: both ends of each, in the frame of the positions, each with the
     radius (m); None for none. Do not write to the arrays: renderers recognise by their identity what they
     have uploaded.
     """

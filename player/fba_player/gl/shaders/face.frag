@@ -1,5 +1,11 @@
 #version 330 core
 //include lighting.glsl
+#ifdef FINELY
+in vec3 before;
+#ifdef SMOOTH
+in vec3 keyed;
+#endif
+#endif
 uniform sampler2D picture; // square roots of linear light
 uniform sampler2D relief;  // noise of three channels
 uniform vec2 fine;         // strength of the skin's relief, 0 for none, and its repetitions
@@ -57,9 +63,17 @@ void main() {
     float depth = dot(texture(wrinkle_map, spot) - 128.0 / 255.0, wrinkles) * 2.0;
     albedo *= max(1.0 + DARKENS * depth, 0.2);
 #endif
+#ifdef FINELY
+    float lit = unshaded(before);
+#else
+    const float lit = 1.0;
+#endif
 #ifdef SMOOTH
     vec3 n = upright.xyz;
     vec3 base = shade.rgb * albedo;
+#ifdef FINELY
+    base -= (1.0 - lit) * keyed * albedo;
+#endif
 #ifdef FINE
     vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
     base *= 1.0 + 0.40 * dot(grain, KEY_DIRECTION);
@@ -68,10 +82,11 @@ void main() {
     float cosine = dot(n, halfway.xyz);
     float nh2 = min(cosine * cosine / (dot(n, n) * dot(halfway.xyz, halfway.xyz)), 1.0);
     vec2 left = unlost(albedo);
-    vec3 shown = base + KEY * (shade.a * left.x * lobes(nh2, coordinates.w)) + AROUND * (halfway.w * left.y);
+    vec3 shown = base + KEY * (lit * shade.a * left.x * lobes(nh2, coordinates.w)) + AROUND * (halfway.w * left.y);
 #else
     vec3 n = normalize(upright.xyz);
     vec3 view = normalize(eye - place);
+    vec4 reach = vec4(lit * light.x, light.yzw);
     albedo *= colour.rgb;
     vec3 rough = n;
 #ifdef FINE
@@ -81,9 +96,9 @@ void main() {
 #endif
     float cosine = dot(rough, normalize(view + KEY_DIRECTION));
     vec2 left = unlost(albedo);
-    vec3 shown = albedo * diffuse(n, albedo, light, scatter)
-        + KEY * (mirrored_key(view, n, light) * left.x * lobes(cosine * cosine, coordinates.w))
-        + AROUND * (mirrored_around(view, n, colour.a, light) * left.y);
+    vec3 shown = albedo * diffuse(n, albedo, reach, scatter)
+        + KEY * (mirrored_key(view, n, reach) * left.x * lobes(cosine * cosine, coordinates.w))
+        + AROUND * (mirrored_around(view, n, colour.a, reach) * left.y);
 #endif
     pixel = vec4(encode(shown), opaque);
 }

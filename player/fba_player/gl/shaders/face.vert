@@ -1,12 +1,22 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
-// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds the skin's relief; LIMBS lets a body's
-// limbs keep light from each other; SOLID ignores alpha, CUT makes holes where
+// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds a relief; LIMBS lets a body's limbs keep
+// the sky from each other; SHADED lets bodies throw shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where
 // it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
 // The head turns rigidly; the neck bends with it, and stands still at its lower end.
 //include lighting.glsl
+#ifdef SHADED
+uniform vec3 frame;       // corner of what the map of shadows shows, along its axes, and its share of a metre
+uniform float clearance;  // metres by which what throws a shadow is off the surface
+#ifdef FINELY
+out vec3 before;          // place in that map, and height
+#ifdef SMOOTH
+out vec3 keyed;           // the key light's part of `shade`
+#endif
+#endif
+#endif
 uniform mat4 world;
 uniform mat4 camera;
 uniform vec3 turn;       // axis of the head's rotation times its angle
@@ -52,24 +62,16 @@ vec3 turned(vec3 at, vec3 axis, float sine, float cosine) {
 }
 
 #ifdef LIMBS
-// Shares of key light and sky that come past limbs: see `fba_player._figure.body_light`.
-vec2 past_limbs(vec3 at, vec3 n) {
-    vec2 past = vec2(1.0);
+// Share of the sky that comes past limbs: see `fba_player._figure.body_light`.
+float past_limbs(vec3 at, vec3 n) {
+    float past = 1.0;
     for (int k = 0; k < 24; k += 2) {
         vec3 away = limbs[k].xyz - at, axis = limbs[k + 1].xyz - limbs[k].xyz;
-        float radius = limbs[k].w, along = dot(axis, KEY_DIRECTION), squared = max(dot(axis, axis), 1e-9);
-        // The sky: a ball at the nearest point of the axis.
+        float radius = limbs[k].w, squared = max(dot(axis, axis), 1e-9);
+        // A ball at the nearest point of the axis.
         vec3 ball = away + axis * clamp(-dot(away, axis) / squared, 0.0, 1.0);
         float per = 1.0 / max(dot(ball, ball), 1e-6), towards = dot(n, ball);
-        if (towards > 0.0) past.y *= 1.0 - min(min(radius * radius * per, 1.0) * 1.4 * towards * sqrt(per), 0.9);
-        // The key light: where the ray to it passes nearest to the axis.
-        float side = dot(away, KEY_DIRECTION);
-        float s = clamp((side * along - dot(away, axis)) / max(squared - along * along, 1e-9), 0.0, 1.0);
-        float ahead = side + s * along, soft = 0.12 * ahead + 0.012;
-        float hidden = smoothstep(-soft, soft, radius - length(away + s * axis - ahead * KEY_DIRECTION));
-        // A limb does not hide its own skin from the light.
-        float near = min((ahead / radius - 0.4) / 1.2, 1.0);
-        if (near > 0.0 && dot(n, KEY_DIRECTION) >= -0.2) past.x *= 1.0 - hidden * near;
+        if (towards > 0.0) past *= 1.0 - min(min(radius * radius * per, 1.0) * 1.4 * towards * sqrt(per), 0.9);
     }
     return past;
 }
@@ -79,7 +81,7 @@ void main() {
     vec3 at = in_position;
     vec4 reach = in_light;
 #ifdef LIMBS
-    reach.xyw *= past_limbs(at, in_normal).xyy;
+    reach.yw *= past_limbs(at, in_normal);
 #endif
     vec3 out_ = in_normal;
     float cover = 1.0;
@@ -114,6 +116,15 @@ void main() {
     upright = vec4(n, facing);
     coordinates = vec4(in_texture, cover, widths(in_colour.a));
     gl_Position = camera * stands;
+#ifdef SHADED
+#ifndef FINELY
+    vec3 before;
+#endif
+    before = vec3(((stands.xyz + clearance * n) * BEFORE - frame.xy) * frame.z, stands.y + clearance * (n.y + 1.0));
+#ifndef FINELY
+    reach.x *= unshaded(before);
+#endif
+#endif
 #ifdef WRINKLED
     wrinkle_place = in_wrinkle;
     wrinkles = mix(wrinkles_right, wrinkles_left, smoothstep(-0.1, 0.1, in_wrinkle.x));
@@ -125,6 +136,9 @@ void main() {
     vec3 albedo = in_colour.rgb;
 #endif
     shade.rgb = in_colour.rgb * diffuse(n, albedo, reach, scatter);
+#ifdef FINELY
+    keyed = shade.rgb - in_colour.rgb * diffuse(n, albedo, vec4(0.0, reach.yzw), scatter);
+#endif
     vec2 left = unlost(in_colour.rgb);
     shade.a = mirrored_key(view, n, reach) * left.x;
     halfway.xyz = normalize(view + KEY_DIRECTION);

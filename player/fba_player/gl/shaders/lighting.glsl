@@ -3,6 +3,10 @@
 uniform vec3 eye;
 
 const vec3 KEY_DIRECTION = normalize(vec3(0.70, 0.68, 0.80));
+// Axes of the map of what is before the key light.
+const vec3 ACROSS = normalize(vec3(0.80, 0.0, -0.70));
+const mat2x3 BEFORE = mat2x3(ACROSS, cross(KEY_DIRECTION, ACROSS));
+const float HIGHEST = 4.0;  // metres: range of the map of what is near the ground
 const vec3 FILL_DIRECTION = normalize(vec3(-0.9, 0.15, 0.6));
 const vec3 BACK_DIRECTION = normalize(vec3(0.45, 0.35, -0.95));
 const vec3 RIM_DIRECTION = normalize(vec3(-0.55, 0.50, -0.85));
@@ -113,3 +117,18 @@ vec3 diffuse(vec3 n, vec3 albedo, vec4 reach, float scatter) {
     float rim = max(dot(n, RIM_DIRECTION), 0.0) * reach.w;
     return KEY * key + dome * open + RIM * (rim + vec3(1.5, 0.32, 0.16) * (reach.z * scatter));
 }
+
+#ifdef SHADED
+// Shadows that bodies throw on bodies.
+uniform sampler2D tops;   // along the key light: what share is covered, height of what it reaches first, its square
+
+// Share of the key light at a place in that map and a height, from mean and variance of the heights around: at most this share of them is not above.
+// Little of that comes from heights that differ by more than one surface can.
+float unshaded(vec3 before) {
+    vec2 aside = vec2(0.6, 0.3) / float(textureSize(tops, 1).x);
+    vec3 seen = textureLod(tops, before.xy + aside, 1.0).rgb + textureLod(tops, before.xy - aside, 1.0).rgb;
+    vec2 mean = seen.yz / max(seen.x, 1e-3);
+    float above = max(mean.x - before.z, 0.0), spread = max(mean.y - mean.x * mean.x, 2e-4);
+    return 0.12 + 0.88 * clamp((spread / (spread + above * above) - 0.2) * 1.25, 0.0, 1.0);
+}
+#endif

@@ -1,7 +1,7 @@
 #version 330 core
-in vec4 nearness;
-out vec4 pixel;
+in vec2 seen;
+out vec4 pixel;        // the greatest is kept
 
 void main() {
-    pixel = nearness;
+    pixel = vec4(seen, seen.y * seen.y, 0.0);
 }
