@@ -69,7 +69,7 @@ ALEX = Looks(
         colours=((30, 21, 17), (54, 38, 29), (84, 60, 44), (122, 90, 66)),
     ),
     skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
-    waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(190, 116, 105), lip_line=(146, 78, 71),
+    waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(191, 114, 103), lip_line=(146, 78, 71),
     freckle=(178, 118, 92), scalp=(112, 86, 73), brow=(52, 38, 30),
 )  # fmt: skip
 """The built-in person: a young man with brown hair."""

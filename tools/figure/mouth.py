@@ -104,7 +104,8 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
     # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
-    behind = np.array([0.95, 0.935, 0.915]) ** (max(place - 2, 0) ** 1.15)
+    shaded = (0.90, 0.88, 0.86) if sign > 0 else (0.84, 0.815, 0.79)
+    behind = np.array(shaded) ** (max(place - 2, 0) ** 1.15)
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * behind
     fissure = 1.0 if flat < 0.5 else 0.72
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1] * fissure])
