@@ -63,7 +63,7 @@ TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""
 LOCK_TRIANGLES = 16
 """Hair of pieces with fewer triangles than this, on average, is locks that lie upon other hair."""
-LOCK_COST = 1e-4
+LOCK_COST = 1e-5
 """Importance of such locks: they go first, each as a whole, as the hair below them stays."""
 OTHER_SHARE = 0.2
 """The same for hair, clothes and what else is worn."""
