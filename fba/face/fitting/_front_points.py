@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter, maximum_filter, zoom
 
 from fba.arrays import Float64, UInt8
 from fba.errors import ModelError, warn
-from fba.face.feature_points import MIRRORED
+from fba.face.feature_points import MATES
 from fba.face.fitting._features import (
     EYES,
     SMALL,
@@ -27,7 +27,6 @@ from fba.face.fitting._found import FoundPoints, Step
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS
 
-_MIRRORED = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 LARGEST = 0.5
 """Largest distance between the pupils that is looked for, as a share of the picture's smaller side."""
 SMALLEST = 0.035
@@ -108,7 +107,7 @@ def _found_again(grey: Float64, middle: Float64, across: Float64) -> tuple[Float
     The spread (P,) is the mean distance from that middle, in distances between the pupils.
     """
     mirror = np.array([grey.shape[1] - 1.0, 0.0])
-    swapped = [FRONT_POINTS.index(_MIRRORED.get(name, name)) for name in FRONT_POINTS]
+    swapped = [FRONT_POINTS.index(MATES.get(name, name)) for name in FRONT_POINTS]
     tries = []
     for right, down, grow in TRIES:
         start = middle + right * across + down * np.array([-across[1], across[0]])
