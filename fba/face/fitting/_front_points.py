@@ -1,7 +1,8 @@
 """`find_front_points`: the feature points of a face on a frontal photograph.
 
 The whole face is found first; then, from each place like one, a cascade of regressions moves the points of a
-mean face to where gradients around them say, from the best place several times; pupils last, by brightness.
+mean face to where gradients around them say, from the best place several times; pupils
+and brows last, by brightness.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from scipy.ndimage import gaussian_filter, maximum_filter, zoom
 from fba.arrays import Float64, UInt8
 from fba.errors import ModelError, warn
 from fba.face.feature_points import MATES
+from fba.face.fitting._brows import follow_brows
 from fba.face.fitting._features import (
     EYES,
     SMALL,
@@ -80,8 +82,10 @@ def find_front_points(photograph: Photograph) -> FoundPoints:
     at, spread = _found_again(grey, middle, across)
     middle, across = standard_frame(at, features().mean)
     face = standard_face(grey, middle, across)
-    places = _with_pupils(face, to_standard(at, middle, across))
-    steps.append(Step("The middle of ten tries, and pupils by their brightness", _draw(face, None, places)))
+    places = follow_brows(face, _with_pupils(face, to_standard(at, middle, across)))
+    steps.append(
+        Step("The middle of ten tries; pupils and brows by their brightness", _draw(face, None, places))
+    )
     at = from_standard(places, middle, across) * photograph.scale
     found = {name: (float(x), float(y)) for name, (x, y) in zip(FRONT_POINTS, at, strict=True)}
     doubts = {
