@@ -15,7 +15,7 @@ NOISE = 0.0004
 """Error of points placed on photographs, metres on the face."""
 SPREADS = ((0.090, 0.006), (0.035, 0.004), (0.004, 0.002))
 """How faces differ: (length, metres, over which differences are alike; their usual size, metres)."""
-ASYMMETRY = 0.1
+ASYMMETRY = 0.2
 """Differences between the two sides of a face, as a share of those between faces."""
 ROUNDS = 25
 TURN_STEP = 0.17
