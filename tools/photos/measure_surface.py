@@ -141,7 +141,7 @@ def _face(head: FaceModel) -> Samples:
     middle = (points[row["3.5"]] + points[row["3.6"]]) / 2
     eyes = float(np.linalg.norm(points[row["3.5"]] - points[row["3.6"]]))
     chin = points[row["2.1"]]
-    keep: Bool = (normals[:, 2] > 0) & _foremost(places) & (y > chin[1]) & (y < middle[1] + FOREHEAD * eyes)
+    keep: Bool = (normals[:, 2] > 0) & foremost(places) & (y > chin[1]) & (y < middle[1] + FOREHEAD * eyes)
     keep &= (z > middle[2] - BEHIND * eyes) & (np.abs(x - middle[0]) < HALF_WIDTH * eyes)
     for outer, inner, upper, lower in (("3.7", "3.11", "3.1", "3.3"), ("3.8", "3.12", "3.2", "3.4")):
         corners = points[[row[outer], row[inner]]]
@@ -155,7 +155,7 @@ def _face(head: FaceModel) -> Samples:
     return places[keep], normals[keep], areas[keep]
 
 
-def _foremost(places: Float64) -> Bool:
+def foremost(places: Float64) -> Bool:
     """Return (N,), whether places are seen from the front."""
     cells = np.unique(np.floor(places[:, :2] / COARSE), axis=0, return_inverse=True)[1].ravel()
     front = np.full(cells.max() + 1, -np.inf)

@@ -1,7 +1,8 @@
 """`find_front_points`: the feature points of a face on a frontal photograph.
 
 The whole face is found first; then, from each place like one, a cascade of regressions moves the points of a
-mean face to where gradients around them say, from the best place several times; pupils last, by brightness.
+mean face to where gradients around them say, from the best place several times; pupils
+and brows last, by brightness.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from scipy.ndimage import gaussian_filter, maximum_filter, zoom
 
 from fba.arrays import Float64, UInt8
 from fba.errors import ModelError, warn
-from fba.face.feature_points import MIRRORED
+from fba.face.feature_points import MATES
+from fba.face.fitting._brows import follow_brows
 from fba.face.fitting._features import (
     EYES,
     SMALL,
@@ -27,7 +29,6 @@ from fba.face.fitting._found import FoundPoints, Step
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS
 
-_MIRRORED = {**MIRRORED, **{right: left for left, right in MIRRORED.items()}}
 LARGEST = 0.5
 """Largest distance between the pupils that is looked for, as a share of the picture's smaller side."""
 SMALLEST = 0.035
@@ -81,8 +82,10 @@ def find_front_points(photograph: Photograph) -> FoundPoints:
     at, spread = _found_again(grey, middle, across)
     middle, across = standard_frame(at, features().mean)
     face = standard_face(grey, middle, across)
-    places = _with_pupils(face, to_standard(at, middle, across))
-    steps.append(Step("The middle of ten tries, and pupils by their brightness", _draw(face, None, places)))
+    places = follow_brows(face, _with_pupils(face, to_standard(at, middle, across)))
+    steps.append(
+        Step("The middle of ten tries; pupils and brows by their brightness", _draw(face, None, places))
+    )
     at = from_standard(places, middle, across) * photograph.scale
     found = {name: (float(x), float(y)) for name, (x, y) in zip(FRONT_POINTS, at, strict=True)}
     doubts = {
@@ -108,7 +111,7 @@ def _found_again(grey: Float64, middle: Float64, across: Float64) -> tuple[Float
     The spread (P,) is the mean distance from that middle, in distances between the pupils.
     """
     mirror = np.array([grey.shape[1] - 1.0, 0.0])
-    swapped = [FRONT_POINTS.index(_MIRRORED.get(name, name)) for name in FRONT_POINTS]
+    swapped = [FRONT_POINTS.index(MATES.get(name, name)) for name in FRONT_POINTS]
     tries = []
     for right, down, grow in TRIES:
         start = middle + right * across + down * np.array([-across[1], across[0]])

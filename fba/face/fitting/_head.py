@@ -10,6 +10,8 @@ import numpy as np
 from fba.errors import ModelError, warn
 from fba.face import FaceModel
 from fba.face.calibration import fit
+from fba.face.feature_points import MIRRORED
+from fba.face.fitting._average import with_average_forms
 from fba.face.fitting._measures import Measure, measure
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS, HIDDEN, SIDE_POINTS, Points, check_inside
@@ -30,8 +32,6 @@ OTHER_VIEW = 50.0
 """Degrees beyond which it cannot be that view at all."""
 MISPLACED = 0.012
 """Metres by which a point is off the fitted head that is told to the user."""
-MIRRORED_NAMES = {"3.5": "3.6", "3.7": "3.12", "8.3": "8.4", "2.13": "2.14", "10.9": "10.10", "10.5": "10.6"}
-"""Names on the subject's right side of points that a profile gives by those of the left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def fit_head(
     apart = float(np.linalg.norm(points[row["3.5"]] - points[row["3.6"]]))
     usual = float(np.linalg.norm(base.points[row["3.5"]] - base.points[row["3.6"]]))
     points *= (usual if eyes is None else eyes) / apart
-    model = fit(base, points, unit="m", name=name)
+    model = fit(with_average_forms(base), points, unit="m", name=name)
     views = fit_views(model.points, views, seen)
     return model, views, seen
 
@@ -177,7 +177,7 @@ def check_view(view: str, photo: Photo) -> None:
 
 def _observe(points: Points, *, right: bool = False) -> Observation:
     """Return points as numbers and places. right: whether they are on the subject's right side."""
-    names = [MIRRORED_NAMES.get(name, name) if right else name for name in points]
+    names = [MIRRORED.get(name, name) if right else name for name in points]
     return Observation(
         [point_rows()[name] for name in names], np.array(list(points.values()), dtype=np.float64)
     )

@@ -13,7 +13,7 @@ from fba.rotations import turn as rotation_about
 
 NOISE = 0.0004
 """Error of points placed on photographs, metres on the face."""
-SPREADS = ((0.090, 0.006), (0.035, 0.004), (0.004, 0.0012))
+SPREADS = ((0.090, 0.006), (0.035, 0.004), (0.004, 0.002))
 """How faces differ: (length, metres, over which differences are alike; their usual size, metres)."""
 ASYMMETRY = 0.2
 """Differences between the two sides of a face, as a share of those between faces."""

@@ -1,0 +1,78 @@
+"""Brows followed as dark ridges near where they were found: their ends, and the top of their upper edge."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, gaussian_filter1d, map_coordinates
+
+from fba.arrays import Float64, Intp
+from fba.face.fitting._points_file import FRONT_POINTS
+
+BROWS = (("4.1", "4.3", "4.5"), ("4.2", "4.4", "4.6"))
+"""Inner end, highest point and outer end of each brow."""
+TRUST = np.array([0.25, 0.5, 0.25])[:, None]
+"""How far these three go to what the ridge shows; chosen on rendered heads from which nothing was learned."""
+COLUMNS, BEYOND = 40, 0.15
+"""Columns that are looked at, and shares of the brow's length beyond its ends."""
+UP, DOWN = 12, 23
+"""Pixels of a face of standard size above and below the brow that was found."""
+USUAL, SPREAD = 4.0, 9.0
+"""Pixels below the found points where the ridge usually is, and by which that differs."""
+STEP = 0.06
+"""What a pixel up or down from column to column costs, in shares of the strongest ridge."""
+FAINT = 0.4
+"""The brow ends where it is fainter than this share of its middle's median."""
+LEAST = 12
+"""Columns that a brow has at least."""
+
+
+def follow_brows(face: Float64, places: Float64) -> Float64:
+    """Return points (P, 2) in a face of standard size, those of the brows moved towards what it shows."""
+    result, smooth = places.copy(), gaussian_filter(face, 1.0)
+    for names in BROWS:
+        rows = [FRONT_POINTS.index(name) for name in names]
+        line = _line(*places[rows])
+        down = np.arange(-UP, DOWN)
+        x = np.repeat(line[:, :1], len(down), axis=1)
+        strip = map_coordinates(smooth, [line[:, 1:] + down, x], order=1, mode="nearest")
+        ridge = np.maximum(gaussian_filter1d(strip, 2.0, axis=1, order=2), 0)
+        ridge = gaussian_filter1d(ridge, 1.5, axis=0) * np.exp(-(((down - USUAL) / SPREAD) ** 2) / 2)
+        path = _strongest_path(ridge / (ridge.max() + 1e-9))
+        strength = ridge[np.arange(COLUMNS), path]
+        dark = np.flatnonzero(strength > FAINT * np.median(strength[8:32]))
+        run = max(np.split(dark, np.flatnonzero(np.diff(dark) > 2) + 1), key=len)
+        if len(run) < LEAST:
+            continue
+        slope = gaussian_filter1d(strip, 1.0, axis=1, order=1)
+        edge = [at - int(slope[k, max(at - 7, 0) : at + 1][::-1].argmin()) for k, at in enumerate(path)]
+        upper = np.column_stack([line[:, 0], gaussian_filter1d(line[:, 1] + down[edge], 1.5)])
+        inner, outer, top = run[0], run[-1], run[upper[run, 1].argmin()]
+        tip = line[outer] + (0, down[path[outer]])
+        result[rows] += TRUST * (np.array([upper[inner], upper[top], tip]) - places[rows])
+    return result
+
+
+def _line(inner: Float64, top: Float64, outer: Float64) -> Float64:
+    """Return (COLUMNS, 2): a parabola through three points, and some way beyond its ends."""
+    along = np.linspace(-BEYOND, 1 + BEYOND, COLUMNS)[:, None]
+    middle = np.clip((top[0] - inner[0]) / (outer[0] - inner[0] + 1e-9), 0.25, 0.75)
+    lift = top - inner - (outer - inner) * middle
+    bend = along * (1 - along) / (middle * (1 - middle))
+    return np.asarray(inner + (outer - inner) * along + lift * np.clip(bend, -0.3, 1))
+
+
+def _strongest_path(strength: Float64) -> Intp:
+    """Return (N,) the row in each of N columns (N, R) of the strongest path from the first to the last."""
+    count, rows = strength.shape
+    total, before = strength.copy(), np.zeros((count, rows), dtype=np.intp)
+    steps = np.arange(-2, 3)
+    for k in range(1, count):
+        padded = np.pad(total[k - 1], 2, constant_values=-np.inf)
+        coming = np.stack([padded[2 - step : 2 - step + rows] for step in steps]) - STEP * abs(steps)[:, None]
+        best = coming.argmax(axis=0)
+        before[k] = np.arange(rows) - steps[best]
+        total[k] += coming[best, np.arange(rows)]
+    path = np.full(count, total[-1].argmax())
+    for k in range(count - 1, 0, -1):
+        path[k - 1] = before[k, path[k]]
+    return path
