@@ -6,6 +6,7 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import PurePath
 from typing import BinaryIO
 
 from fba.errors import (
@@ -62,6 +63,11 @@ def open_source(path: Path) -> tuple[BinaryIO, int]:
         file.close()
         raise FormatError("is empty (0 bytes); was it fully copied or written?", path=name)
     return file, size
+
+
+def stem_of(path: Path) -> str:
+    """Return the name of a file without its folder and its suffix."""
+    return PurePath(path).stem
 
 
 def read_head(path: Path) -> bytes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from fba.animation import Animation
@@ -11,7 +10,7 @@ from fba.atomic import atomic
 from fba.choices import BapTableOrAuto
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BAP_STEPS_AUTO
-from fba.source import Path, naming_file, read_whole
+from fba.source import Path, naming_file, read_whole, stem_of
 
 if TYPE_CHECKING:
     from fba.codec import EncoderOptions
@@ -74,7 +73,7 @@ def decode_file(
         animation = decode(
             data, bap_steps=bap_steps, on_error="salvage" if salvage else "raise", limits=limits
         )
-    return replace(animation, name=animation.name or FilePath(path).stem)
+    return replace(animation, name=animation.name or stem_of(path))
 
 
 def write_fba(

@@ -6,7 +6,6 @@ import os
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from pathlib import Path as FilePath
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -39,7 +38,7 @@ from fba.formats.text.frame_rates import Rate
 from fba.formats.zip_files import ZIP
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.sampling import find_rate, frame_numbers, interpolate
-from fba.source import Path, naming_file, read_whole
+from fba.source import Path, naming_file, read_whole, stem_of
 from fba.tracks import FaceTrack
 
 ON_FRAME = 1e-4
@@ -156,7 +155,7 @@ class _Person:
 
     @property
     def name(self) -> str:
-        return FilePath(self.path).stem
+        return stem_of(self.path)
 
     @cached_property
     def face(self) -> ShapeMotion | None:

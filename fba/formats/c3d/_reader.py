@@ -6,7 +6,6 @@ MIPS processors, more markers than one list of labels holds, more frames than th
 
 from __future__ import annotations
 
-from pathlib import Path as FilePath
 from typing import get_args
 
 import numpy as np
@@ -20,7 +19,7 @@ from fba.formats.markers._rows import METRES, file_rate, unique_names, without_s
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.sampling import regular_times
-from fba.source import Path, naming_file, read_whole
+from fba.source import Path, naming_file, read_whole, stem_of
 
 COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
 """Lists, in group POINT, of labels that are no markers: programs store computed values beside markers."""
@@ -97,7 +96,7 @@ def read_markers(
     names, times = tuple(labels[n] for n in kept), regular_times(frames, rate)
     with naming_file(path):
         return MarkerMotion(
-            names, values[:, kept], times, rate, unit=unit, up=_up(parameters), name=FilePath(path).stem
+            names, values[:, kept], times, rate, unit=unit, up=_up(parameters), name=stem_of(path)
         )
 
 

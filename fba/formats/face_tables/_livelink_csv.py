@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from fractions import Fraction
-from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +37,7 @@ from fba.formats.time_codes import DAY, read_time_codes
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import key_of
 from fba.sampling import find_rate
-from fba.source import Path, naming_file
+from fba.source import Path, naming_file, stem_of
 
 MIN_SHAPES = 5
 """Smallest number of shapes with ARKit's names or synonyms in a table; beside times, one is enough."""
@@ -100,7 +99,7 @@ def read_face(
         still += ["eyes"] if not np.nan_to_num(eyes).any() else []
     motion = ShapeMotion(
         tuple(shapes), weights, times.seconds, times.rate, head=head, eyes=eyes, start=times.start,
-        name=FilePath(path).stem, findings=tuple(odd + _findings(table, columns, weights, times, still)),
+        name=stem_of(path), findings=tuple(odd + _findings(table, columns, weights, times, still)),
     )  # fmt: skip
     return find_swap(motion, swap, expected=_is_of_the_app(table.names)) if times.coded else motion
 

@@ -8,7 +8,6 @@ other action units; their exact set tells them.
 from __future__ import annotations
 
 import re
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from fba.formats.face_tables._faces import (
 from fba.formats.face_tables._tables import Table, header_names, read_table
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path
+from fba.source import Path, stem_of
 
 INTENSITY = re.compile(r"AU(\d\d)_r")
 PRESENCE = re.compile(r"AU(\d\d)_c")
@@ -74,7 +73,7 @@ def read_face(
         rows.units, rows.intensities, rows.times, rows.rate,
         head=None if turns is None else head_angles(turns),
         eyes=_eyes(table, rows.numbers, turns),
-        name=FilePath(path).stem, findings=tuple(findings),
+        name=stem_of(path), findings=tuple(findings),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture import PointMotion
-from fba.source import Path, naming_file
+from fba.source import Path, naming_file, stem_of
 
 MIN_DEPTH = 0.08
 """Smallest ratio of a face's depth to its width, and of its width to its depth."""
@@ -23,10 +23,8 @@ def build_points(
     rate: Fraction,
     *,
     path: Path,
-    name: str,
     metric: bool = False,
     aspect: float | None = None,
-    eyes: Float64 | None = None,
     findings: Sequence[str] = (),
 ) -> PointMotion:
     """Return points (T, N, 2 or 3) as a motion. Their size tells whether they are shares of the picture.
@@ -48,7 +46,7 @@ def build_points(
         share = False  # a face centred at 0
     with naming_file(path):
         return PointMotion(
-            positions, times, rate, metric=metric, share=share, aspect=aspect, eyes=eyes, name=name,
+            positions, times, rate, metric=metric, share=share, aspect=aspect, name=stem_of(path),
             findings=tuple(findings),
         )  # fmt: skip
 

@@ -8,7 +8,6 @@ size of the picture are further arrays: `times` or `timestamps`, `fps`, `width` 
 from __future__ import annotations
 
 from fractions import Fraction
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -50,7 +49,7 @@ def read_points(
     times, rate = _times(arrays, len(positions), source_rate, path)
     width, height = (_number(arrays, name) for name in ("width", "height"))
     return build_points(
-        positions, times, rate, path=path, name=FilePath(path).stem,
+        positions, times, rate, path=path,
         aspect=width / height if width and height else None,
     )  # fmt: skip
 

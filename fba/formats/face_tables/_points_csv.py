@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -92,7 +91,7 @@ def read_points(
     metric = long is None and _is_metric(table.names)
     positions[~tracked_rows(table)[first]] = np.nan
     return build_points(
-        positions * (MILLIMETRE if metric else 1.0), times, rate, path=path, name=FilePath(path).stem,
+        positions * (MILLIMETRE if metric else 1.0), times, rate, path=path,
         metric=metric, aspect=_read_aspect(table, by_word), findings=odd,
     )  # fmt: skip
 

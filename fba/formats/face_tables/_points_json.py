@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from fractions import Fraction
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -79,9 +78,7 @@ def read_points(
     if source_rate is None and len(frames) == 1:
         source_rate = 30
     times, rate = frame_times([frame_time(frame) for frame in frames], len(frames), source_rate, path)
-    return build_points(
-        positions, times, rate, path=path, name=FilePath(path).stem, aspect=_aspect(document, frames)
-    )
+    return build_points(positions, times, rate, path=path, aspect=_aspect(document, frames))
 
 
 def _read(path: Path, limits: Limits) -> Any:

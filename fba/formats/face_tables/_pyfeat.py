@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -36,7 +35,7 @@ from fba.formats.face_tables._tables import Table, header_names, read_table
 from fba.formats.face_tables.shape_weights import check_weights, find_lacks, shape_of
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path
+from fba.source import Path, stem_of
 
 UNIT = re.compile(r"AU(\d\d)")
 BOX = ("FaceRectX", "FaceRectY", "FaceRectWidth", "FaceRectHeight")
@@ -92,7 +91,7 @@ def read_face(
     if POSE[0] in column:
         findings.append(how)
     return ActionUnitMotion(
-        rows.units, _usual_strengths(rows), rows.times, rows.rate, head=head, name=FilePath(path).stem,
+        rows.units, _usual_strengths(rows), rows.times, rows.rate, head=head, name=stem_of(path),
         findings=tuple(findings),
     )  # fmt: skip
 
@@ -117,7 +116,7 @@ def _read_shapes(
     if POSE[0] in column and not set(MESH_POSE) <= set(column):
         findings.append(how)
     return ShapeMotion(
-        tuple(shapes), weights, times, rate, head=head, name=FilePath(table.path).stem,
+        tuple(shapes), weights, times, rate, head=head, name=stem_of(table.path),
         findings=tuple(findings),
     )  # fmt: skip
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import key_of
 from fba.sampling import find_rate
-from fba.source import Path, naming_file, read_whole
+from fba.source import Path, naming_file, read_whole, stem_of
 
 MIN_SHAPES = 5
 """Fewest synonyms of ARKit's names in a set of blendshapes; one of ARKit's own names is enough."""
@@ -64,7 +63,7 @@ def read_face(path: Path, *, source_rate: Rate | None = None, limits: Limits = D
     times, rate = frame_times(stamps, len(weights), source_rate, path)
     odd = [f"names that mean nothing here are left out: {named(strange)}"] if strange else []
     return ShapeMotion(
-        tuple(names), weights, times, rate, name=FilePath(path).stem,
+        tuple(names), weights, times, rate, name=stem_of(path),
         findings=tuple(odd + find_lacks(names, weights, times, rate)),
     )  # fmt: skip
 

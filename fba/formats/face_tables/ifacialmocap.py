@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from fba.formats.face_tables._tables import named
 from fba.formats.face_tables.shape_weights import find_lacks, shape_of
 from fba.formats.text.frame_rates import Rate
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path, read_whole
+from fba.source import Path, read_whole, stem_of
 
 RATE = 60
 """Records that the app sends per second; they hold no times."""
@@ -64,7 +63,7 @@ def read_face(path: Path, *, source_rate: Rate | None = None, limits: Limits = D
         findings.append(f"names that mean nothing here are left out: {named(sorted(strange))}")
     findings += find_lacks(shapes, weights, times, rate)
     return ShapeMotion(
-        tuple(shapes), weights, times, rate, head=head, eyes=eyes, name=FilePath(path).stem,
+        tuple(shapes), weights, times, rate, head=head, eyes=eyes, name=stem_of(path),
         findings=tuple(findings),
     )  # fmt: skip
 

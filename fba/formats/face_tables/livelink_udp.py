@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import struct
 from fractions import Fraction
-from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from fba.formats.face_tables._tables import named
 from fba.formats.face_tables.shape_weights import check_weights, find_lacks, find_swap
 from fba.formats.time_codes import DAY, NOON
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.source import Path, read_whole
+from fba.source import Path, read_whole, stem_of
 
 VERSION = 6
 VALUES = 61
@@ -78,7 +77,7 @@ def read_face(
     findings += find_lacks(arkit_names(), weights, times - times[0], rate)
     motion = ShapeMotion(
         arkit_names(), weights, times - times[0], rate, head=head, eyes=eyes, start=float(times[0]),
-        name=FilePath(path).stem, findings=tuple(findings),
+        name=stem_of(path), findings=tuple(findings),
     )  # fmt: skip
     return find_swap(motion, swap, expected=False)
 

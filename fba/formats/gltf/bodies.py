@@ -12,7 +12,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -33,7 +32,7 @@ from fba.formats.gltf.clips import ClipInfo, list_clips
 from fba.gltf import Gltf, GltfMaterial, Node, Primitive, convert_material, read_gltf
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.mesh import Material, UniqueNames
-from fba.source import Path, naming_file
+from fba.source import Path, naming_file, stem_of
 
 CHUNK = 20_000
 """Vertices whose weights are reduced at once."""
@@ -184,7 +183,7 @@ def _import_person(gltf: Gltf, path: Path, joints: Mapping[str, str] | None) -> 
     parts = [mesh.part for mesh in meshes]
     if not parts:
         raise ModelError(f"{gltf.file}: no mesh hangs on its skeleton; there is nothing to show")
-    name = FilePath(os.fspath(path)).stem
+    name = stem_of(path)
     head = read_head(gltf, found.humanoid, meshes, fit.turn)
     return _stand(BodyModel(tuple(parts), *_bound(fit, fit.places), name=name, own_head=head), name)
 

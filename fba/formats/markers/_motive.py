@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import re
 from contextlib import suppress
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -81,7 +80,7 @@ def read_markers(
     return build_motion(
         without_subject([label for label, _ in chosen]), rows[:, places], frame_times(times, rate), rate,
         metres=METRES.get(unit, 1.0), unit=unit, up="+y",
-        name=settings.get("take name", "") or FilePath(path).stem, path=path, lines=numbers,
+        name=settings.get("take name", ""), path=path, lines=numbers,
         start=_find_start(settings, columns, lines, numbers, times, path),
     )  # fmt: skip
 

@@ -7,7 +7,6 @@ axes, a row of units, the data, and an empty line.
 from __future__ import annotations
 
 import re
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -71,5 +70,5 @@ def read_markers(
     return build_motion(
         without_subject(labels), rows[:, columns], times, rate,
         metres=METRES.get(unit, 0.001), unit=unit if unit in METRES else "", up="+z",
-        name=FilePath(path).stem, path=path, lines=numbers,
+        path=path, lines=numbers,
     )  # fmt: skip

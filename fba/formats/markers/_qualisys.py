@@ -6,7 +6,6 @@ An unseen marker has three zeros or three empty cells. Columns for frame and tim
 from __future__ import annotations
 
 import re
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -77,7 +76,7 @@ def read_markers(
     times = frame_times(rows[:, 1], rate) if leading == 2 else regular_times(len(rows), rate)
     begun = parse_time_of_day(" ".join(settings.get("TIME_STAMP", ())[:1]))
     return build_motion(
-        labels, positions, times, rate, metres=0.001, unit="mm", up="+z", name=FilePath(path).stem, path=path,
+        labels, positions, times, rate, metres=0.001, unit="mm", up="+z", path=path,
         lines=numbers, start=None if begun is None else begun + float(times[0]),
     )  # fmt: skip
 

@@ -15,7 +15,7 @@ from fba.formats.text.frame_rates import Rate, parse_rate
 from fba.limits import Limits
 from fba.recognition import HEAD_BYTES, recognition_hint
 from fba.sampling import regular_times
-from fba.source import Path, naming_file, read_whole
+from fba.source import Path, naming_file, read_whole, stem_of
 
 MISSING = ("", "nan", "null", "none", "-", "na", "n/a")
 """Words, in lower case, that stand for a number that is not there."""
@@ -116,15 +116,15 @@ def build_motion(
     metres: float,
     unit: str,
     up: FileUpAxis,
-    name: str,
     path: Path,
     lines: list[int],
+    name: str = "",
     start: float | None = None,
 ) -> MarkerMotion:
     """Return the motion. Raises FormatError.
 
     metres: length of the file's unit. lines: the line of each frame, for errors. start: time of day of the
-    first frame, in seconds.
+    first frame, in seconds. name: by default the file's.
     """
     back = np.flatnonzero(np.diff(times) <= 0)
     if len(back):
@@ -136,7 +136,9 @@ def build_motion(
         )
     names = tuple(unique_names(labels, len(labels)))
     with naming_file(path):
-        return MarkerMotion(names, positions * metres, times, rate, unit=unit, up=up, name=name, start=start)
+        return MarkerMotion(
+            names, positions * metres, times, rate, unit=unit, up=up, name=name or stem_of(path), start=start
+        )
 
 
 def warn_if_cut(path: Path, stated: float, count: int) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import re
 from fractions import Fraction
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -61,7 +60,6 @@ def read_markers(
     lines = read_lines(path, "a table of markers")
     delimiter = _delimiter(lines[0])
     cells = _cells(lines[0], delimiter)
-    name = FilePath(path).stem
     if _is_long(cells):
         labels, positions, times, numbers = _read_long(lines, cells, delimiter, path, limits)
         unit = ""
@@ -88,7 +86,7 @@ def read_markers(
         rate = file_rate("", source_rate, path)
         times = regular_times(len(positions), rate)
     return build_motion(
-        labels, positions, times, rate, metres=METRES.get(unit, 1.0), unit=unit, up="", name=name, path=path,
+        labels, positions, times, rate, metres=METRES.get(unit, 1.0), unit=unit, up="", path=path,
         lines=numbers,
     )  # fmt: skip
 

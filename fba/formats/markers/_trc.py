@@ -7,7 +7,6 @@ Programs differ: some write no empty line before the data, no two empty cells af
 from __future__ import annotations
 
 import re
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -68,7 +67,7 @@ def read_markers(
     unit = header.get("units", "").lower()
     return build_motion(
         without_subject(labels), rows[:, 2:].reshape(len(rows), -1, 3), frame_times(times, rate), rate,
-        metres=METRES.get(unit, 0.001), unit=unit if unit in METRES else "", up="", name=FilePath(path).stem,
+        metres=METRES.get(unit, 0.001), unit=unit if unit in METRES else "", up="",
         path=path, lines=numbers,
     )  # fmt: skip
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cache
-from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +26,7 @@ from fba.formats.text.frame_rates import Rate
 from fba.formats.zip_files import ZIP
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.sampling import find_rate, interpolate
-from fba.source import Path, naming_file
+from fba.source import Path, naming_file, stem_of
 from fba.text_files import packaged_rows
 
 RATES = ("mocap_frame_rate", "mocap_framerate", "fps")
@@ -159,7 +158,7 @@ def _skeleton(read_in: _Motion, path: Path, limits: Limits) -> SkeletonMotion:
     return SkeletonMotion(
         names, np.array([names.index(row[1]) if row[1] else -1 for row in table]),
         np.array([row[2] for row in table]), turns, upright.apply(read_in.path), read_in.rate,
-        name=FilePath(path).stem, up="+y", face=lambda times: _face(read_in, times, limits),
+        name=stem_of(path), up="+y", face=lambda times: _face(read_in, times, limits),
     )  # fmt: skip
 
 
