@@ -59,7 +59,8 @@ class Case:
 
     def animation(self) -> Animation:
         """One frame."""
-        found = still_animation(Pose(self.faps or ("open_jaw=0",), self.visemes, self.expressions))
+        rest = () if self.visemes or self.expressions else ("open_jaw=0",)
+        found = still_animation(Pose(self.faps or rest, self.visemes, self.expressions))
         if self.content == "face":
             return found
         values = np.zeros((1, BAP_COUNT), dtype=np.int32)
