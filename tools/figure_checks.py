@@ -232,8 +232,8 @@ def _count_crossings(ends: Float64, corners: Float64, first: Intp, last: Intp) -
             if towards == 0.0:
                 continue
             x, y, z = dy * wz - dz * wy, dz * wx - dx * wz, dx * wy - dy * wx
-            u = -(two[0] * x + two[1] * y + two[2] * z) / towards
-            v = (one[0] * x + one[1] * y + one[2] * z) / towards
+            u = (two[0] * x + two[1] * y + two[2] * z) / towards
+            v = -(one[0] * x + one[1] * y + one[2] * z) / towards
             t = (dx * nx + dy * ny + dz * nz) / towards
             count += u >= 0.0 and v >= 0.0 and u + v <= 1.0 and 0.0 <= t <= 1.0
     return count
