@@ -375,7 +375,7 @@ def _smoothstep(t: float) -> float:
 @inlined
 def _length(vector: Float64) -> float:
     """Return the length of a vector."""
-    return np.sqrt((vector * vector).sum())
+    return float(np.sqrt((vector * vector).sum()))
 
 
 @inlined
