@@ -29,6 +29,7 @@ from fba import figures
 from fba.animation import Animation
 from fba.arrays import Bool, Float32, Float64, Intp
 from fba.body import BodyModel
+from fba.compiled import compiled
 from fba.face import Deformer, FaceModel, resolve
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
 from fba.face.macros import open_mouth
@@ -192,31 +193,50 @@ class Checked:
 
 
 def pierced(positions: Float32, edges: Intp, triangles: Intp) -> int:
-    """Return how many edges (E, 2) pass through triangles (F, 3)."""
-    start = positions[edges[:, 0]].astype(np.float64)
-    way = positions[edges[:, 1]] - start
-    corner = positions[triangles].astype(np.float64)
-    middle = corner.mean(axis=1)
-    reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
-    reach += np.linalg.norm(way, axis=1).max() / 2
-    near = cKDTree(start + way / 2).query_ball_point(middle, reach)
-    pairs = np.repeat(np.arange(len(triangles)), [len(those) for those in near])
-    edge = np.concatenate([np.asarray(those, dtype=np.intp) for those in near])
-    return int(_crossings(start[edge], way[edge], corner[pairs]).sum())
+    """Return how many times edges (E, 2) pass through triangles (F, 3)."""
+    ends = positions[edges].astype(np.float64)
+    ends = ends[ends[:, :, 1].min(axis=1).argsort()]
+    lowest = ends[:, :, 1].min(axis=1)
+    corners = positions[triangles].astype(np.float64)
+    first = np.searchsorted(lowest, corners[:, :, 1].min(axis=1) - np.ptp(ends[:, :, 1], axis=1).max())
+    last = np.searchsorted(lowest, corners[:, :, 1].max(axis=1), "right")
+    return int(_count_crossings(ends, corners, first, last))
 
 
-def _crossings(start: Float64, way: Float64, corner: Float64) -> Bool:
-    """Return (N,) whether segments cross triangles (N, 3, 3), each its own, by Moeller and Trumbore."""
-    one, two = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    across = np.cross(way, two)
-    det = (across * one).sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        away = start - corner[:, 0]
-        u = (away * across).sum(axis=1) / det
-        turned = np.cross(away, one)
-        v = (way * turned).sum(axis=1) / det
-        t = (turned * two).sum(axis=1) / det
-        return np.asarray((u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1))
+@compiled
+def _count_crossings(ends: Float64, corners: Float64, first: Intp, last: Intp) -> int:
+    """Return how many edges (E, 2, 3) cross triangles (F, 3, 3), by Moeller and Trumbore.
+
+    first, last: (F,) bounds of the edges that are looked at for each, within 0..E. An edge in the plane of a
+    triangle does not cross it.
+    """
+    count = 0
+    for f in range(len(corners)):
+        a, b, c = corners[f]
+        low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        one, two = b - a, c - a
+        nx, ny, nz = (
+            one[1] * two[2] - one[2] * two[1],
+            one[2] * two[0] - one[0] * two[2],
+            one[0] * two[1] - one[1] * two[0],
+        )
+        for e in range(first[f], last[f]):
+            p, q = ends[e]
+            if max(p[0], q[0]) < low[0] or min(p[0], q[0]) > high[0]:
+                continue
+            if max(p[2], q[2]) < low[2] or min(p[2], q[2]) > high[2]:
+                continue
+            wx, wy, wz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+            dx, dy, dz = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+            towards = -(wx * nx + wy * ny + wz * nz)
+            if towards == 0.0:
+                continue
+            x, y, z = dy * wz - dz * wy, dz * wx - dx * wz, dx * wy - dy * wx
+            u = (two[0] * x + two[1] * y + two[2] * z) / towards
+            v = -(one[0] * x + one[1] * y + one[2] * z) / towards
+            t = (dx * nx + dy * ny + dz * nz) / towards
+            count += u >= 0.0 and v >= 0.0 and u + v <= 1.0 and 0.0 <= t <= 1.0
+    return count
 
 
 def _sampled(line: Float64) -> Float64:

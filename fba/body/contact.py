@@ -4,6 +4,8 @@ A motion was made for other proportions than those of the body that shows it, wh
 clothes. Legs and trunk are measured in the default posture, as radii about vertical lines that move with a
 joint each; points of hands and forearms are kept outside. Shoulder and wrist turn for it, by damped least
 squares in a fixed number of small steps: the result depends on the pose alone, and changes smoothly with it.
+No smooth rule brings every hand out of a body and leaves those outside in place: one behind the middle of a
+thigh or trunk, seen from where its arm hangs, is shown inside where it would change sides.
 
 Bounds: `find_contact` makes all arrays for the joints of one skeleton, and `Contact.keep_apart` takes no
 matrices of another shape; angles are in 0..1 turn, and heights are checked before radii are looked up.
@@ -53,9 +55,14 @@ DAMPING = (0.5, 0.6)
 """Metres: damping of the turns of shoulder and wrist."""
 LARGEST = (0.10, 0.05)
 """Radians: largest turn of shoulder and wrist in a step."""
-OUTWARDS = (0.6, 0.6)
-"""How much points are pushed to their arm's side, and ahead, besides away from the middle of what they are
-in: one on the far side of that middle comes out where arms come from, without a jump."""
+OUTWARDS = (0.7, 0.7)
+"""How far arms are led to their own side, and ahead, in the middle of a part: there no direction leads away
+from it. A share of the depth elsewhere."""
+HELD = 0.5
+"""Depth, as a share of a part's width, from which the way out is that of the pose as it came."""
+SURE = 0.55
+"""Length of the way out from which it is followed in full. Behind the middle it shrinks to 0 and turns round:
+a hand that passes there is shown inside, for it would jump from one side to the other."""
 
 
 class Parts(NamedTuple):
@@ -104,11 +111,11 @@ class Contact:
     def depths(self, matrices: Float64) -> Float64:
         """Return (arms,) metres by which the deepest point of each arm is inside the body; 0 for outside."""
         found = np.zeros(len(self.arms))
-        for arm, (_, _, points, side) in enumerate(self.arms):
+        for arm, (_, _, points, _) in enumerate(self.arms):
             for point in range(len(points.joints)):
                 place = _place(matrices, points, point)
                 for part in range(len(self.parts.joints)):
-                    inside = _depth(matrices, self.parts, part, place, side)[0] - MARGIN
+                    inside = _depth(matrices, self.parts, part, place)[0] - MARGIN
                     found[arm] = max(found[arm], inside)
         return found
 
@@ -233,22 +240,21 @@ def _place(matrices: Float64, points: Points, point: int) -> tuple[float, float,
 
 @inlined
 def _depth(
-    matrices: Float64, parts: Parts, part: int, place: tuple[float, float, float], side: float
+    matrices: Float64, parts: Parts, part: int, place: tuple[float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Return by how much a point is inside a part with its margin, metres, and the direction out of it."""
+    """Return metres: how deep a point is in a part with its margin, the radius, x and z from the middle."""
     j, m = parts.joints[part], matrices
     a, b, c = place[0] - m[j, 0, 3], place[1] - m[j, 1, 3], place[2] - m[j, 2, 3]
     y = m[j, 0, 1] * a + m[j, 1, 1] * b + m[j, 2, 1] * c
     low, high = parts.ends[part, 0], parts.ends[part, 1]
     if not (low - FADE <= y <= high + FADE):  # written so that NaN is outside
-        return -1.0, 0.0, 0.0, 0.0
+        return -1.0, 1.0, 0.0, 0.0
     x = m[j, 0, 0] * a + m[j, 1, 0] * b + m[j, 2, 0] * c - parts.middles[part, 0]
     z = m[j, 0, 2] * a + m[j, 1, 2] * b + m[j, 2, 2] * c - parts.middles[part, 1]
     away = np.sqrt(x * x + z * z)
     if not away <= parts.widest[part] + MARGIN:
-        return -1.0, 0.0, 0.0, 0.0
-    t = min(max((low - y) / FADE, (y - high) / FADE, 0.0), 1.0)
-    fade = 1.0 - t * t * (3.0 - 2.0 * t)
+        return -1.0, 1.0, 0.0, 0.0
+    fade = 1.0 - _smoothstep(max(low - y, y - high) / FADE)
     at = min(max((y - low) / (high - low), 0.0), 1.0) * (LEVELS - 1)
     row = min(int(at), LEVELS - 2)
     up = at - row
@@ -260,61 +266,116 @@ def _depth(
     lower = parts.radii[part, row, first] * (1.0 - on) + parts.radii[part, row, second] * on
     upper = parts.radii[part, row + 1, first] * (1.0 - on) + parts.radii[part, row + 1, second] * on
     radius = (lower * (1.0 - up) + upper * up + MARGIN) * fade
-    depth = radius - away
-    if depth <= 0.0:
-        return -1.0, 0.0, 0.0, 0.0
-    # Away from the middle, the more to the side and ahead the deeper it is.
-    deep = depth / radius
-    nx, nz = x / radius + OUTWARDS[0] * side * deep, z / radius + OUTWARDS[1] * deep
-    length = max(np.sqrt(nx * nx + nz * nz), 0.1)
-    nx, nz = nx / length, nz / length
-    return (
-        depth,
-        m[j, 0, 0] * nx + m[j, 0, 2] * nz,
-        m[j, 1, 0] * nx + m[j, 1, 2] * nz,
-        m[j, 2, 0] * nx + m[j, 2, 2] * nz,
-    )
+    return radius - away, radius, x, z
+
+
+@inlined
+def _measure(
+    matrices: Float64, parts: Parts, points: Points, depths: Float64, ways: Float64, side: float
+) -> float:
+    """Fill depths (P,), metres, and ways (2, 3); return how deep the arm is, as a share of a part's width.
+
+    The first way is the mean direction from the middles of the parts to the points in them, shorter near the
+    middles; the second is to the side and ahead, the longer the deeper.
+    """
+    m = matrices
+    ways[:], depths[:] = 0.0, 0.0
+    total, most = 0.0, 0.0
+    for part in range(len(parts.joints)):
+        j = parts.joints[part]
+        x_sum, z_sum, deepest = 0.0, 0.0, 0.0
+        for point in range(len(depths)):
+            depth, radius, x, z = _depth(m, parts, part, _place(m, points, point))
+            if depth > 0.0:
+                depths[point] = max(depths[point], depth)
+                deepest = max(deepest, depth)
+                total += depth * depth
+                x_sum += depth * depth * x / radius
+                z_sum += depth * depth * z / radius
+        share = deepest / parts.widest[part] if deepest > 0.0 else 0.0
+        most = max(most, share)
+        for i in range(3):
+            ways[0, i] += x_sum * m[j, i, 0] + z_sum * m[j, i, 2]
+            ways[1, i] += share * (OUTWARDS[0] * side * m[j, i, 0] + OUTWARDS[1] * m[j, i, 2])
+    for i in range(3):
+        ways[0, i] /= max(total, 1e-12)
+    return most
+
+
+@inlined
+def _find_turns(
+    matrices: Float64, joints: tuple[int, int], points: Points, depths: Float64, way: Float64, wanted: Float64
+) -> None:
+    """Fill wanted (6,): turns of shoulder and wrist that move points by depths (P,) along a way (3,)."""
+    normal, row = np.zeros((6, 6)), np.zeros(6)
+    wanted[:] = 0.0
+    for point in range(len(depths)):
+        depth = depths[point]
+        if depth <= 0.0:
+            continue
+        place = _place(matrices, points, point)
+        for k in range(2):
+            x = place[0] - matrices[joints[k], 0, 3]
+            y = place[1] - matrices[joints[k], 1, 3]
+            z = place[2] - matrices[joints[k], 2, 3]
+            held = 1.0 if k == 0 or points.joints[point] >= joints[1] else 0.0
+            row[3 * k] = held * (y * way[2] - z * way[1])
+            row[3 * k + 1] = held * (z * way[0] - x * way[2])
+            row[3 * k + 2] = held * (x * way[1] - y * way[0])
+        for i in range(6):
+            wanted[i] += row[i] * depth * depth
+            for k in range(6):
+                normal[i, k] += row[i] * row[k] * depth
+    for i in range(6):
+        damping = DAMPING[0] if i < 3 else DAMPING[1]
+        normal[i, i] += damping * damping * depths.max()
+    _solve(normal, wanted)
+    for k in range(2):
+        turn = wanted[3 * k : 3 * k + 3]
+        turn /= 1.0 + np.sqrt((turn * turn).sum()) / LARGEST[k]
 
 
 @compiled
 def push_out(
     matrices: Float64, parts: Parts, carried: Int64, hand: Int64, points: Points, side: float, turns: Float64
 ) -> None:
-    """Turn shoulder and wrist of an arm in place, and add up the turns in (2, 3), until it is outside."""
-    shoulder, wrist = carried[0], hand[0]
-    normal, wanted, row = np.zeros((6, 6)), np.zeros(6), np.zeros(6)
-    for _ in range(STEPS):
-        normal[:], wanted[:] = 0.0, 0.0
-        deepest = 0.0
-        for point in range(len(points.joints)):
-            place = _place(matrices, points, point)
-            of_hand = points.joints[point] >= wrist
-            for part in range(len(parts.joints)):
-                depth, nx, ny, nz = _depth(matrices, parts, part, place, side)
-                if depth <= 0.0:
-                    continue
-                deepest = max(deepest, depth)
-                for k in range(2):
-                    joint = shoulder if k == 0 else wrist
-                    x = place[0] - matrices[joint, 0, 3]
-                    y = place[1] - matrices[joint, 1, 3]
-                    z = place[2] - matrices[joint, 2, 3]
-                    held = 1.0 if k == 0 or of_hand else 0.0
-                    row[3 * k] = held * (y * nz - z * ny)
-                    row[3 * k + 1] = held * (z * nx - x * nz)
-                    row[3 * k + 2] = held * (x * ny - y * nx)
-                for i in range(6):
-                    wanted[i] += row[i] * depth * depth
-                    for k in range(6):
-                        normal[i, k] += row[i] * row[k] * depth
-        if deepest <= 0.0:
+    """Turn shoulder and wrist of an arm in place, and add up the turns in (2, 3), until it is outside.
+
+    All points go one way: if each chose its own, a hand through a thigh would be held there from both sides.
+    """
+    moved = matrices.copy()  # goes all the way out; `matrices` a share of it where no way is sure
+    depths, wanted = np.zeros(len(points.joints)), np.zeros(6)
+    now, first = np.zeros((2, 3)), np.zeros((2, 3))
+    share, hold = 1.0, 0.0
+    for step in range(STEPS):
+        most = _measure(moved, parts, points, depths, now, side)
+        if most <= 0.0:
             return
-        for i in range(6):
-            damping = DAMPING[0] if i < 3 else DAMPING[1]
-            normal[i, i] += damping * damping * deepest
-        _solve(normal, wanted)
-        _turn(matrices, carried, wanted[:3], LARGEST[0], turns[0])
-        _turn(matrices, hand, wanted[3:], LARGEST[1], turns[1])
+        if step == 0:
+            first[:] = now
+            share = _smoothstep(_length(now[0] + now[1]) / SURE)
+            hold = _smoothstep(most / HELD)
+        way = now[0] * (1.0 - hold) + first[0] * hold + first[1]
+        way /= max(_length(way), 1e-9)
+        _find_turns(moved, (carried[0], hand[0]), points, depths, way, wanted)
+        for k in range(2):
+            turn, joints = wanted[3 * k : 3 * k + 3], carried if k == 0 else hand
+            _turn(moved, joints, turn)
+            _turn(matrices, joints, turn * share)
+            turns[k] += turn * share
+
+
+@inlined
+def _smoothstep(t: float) -> float:
+    """Return 0 up to 0 and 1 from 1 on, smoothly."""
+    t = min(max(t, 0.0), 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+@inlined
+def _length(vector: Float64) -> float:
+    """Return the length of a vector."""
+    return float(np.sqrt((vector * vector).sum()))
 
 
 @inlined
@@ -333,16 +394,12 @@ def _solve(normal: Float64, wanted: Float64) -> None:
 
 
 @inlined
-def _turn(matrices: Float64, joints: Int64, turn: Float64, largest: float, turns: Float64) -> None:
-    """Turn joints about the first of them, in place, by a vector (3,), shortened to at most largest."""
-    size = np.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
-    if size < 1e-12:
+def _turn(matrices: Float64, joints: Int64, turn: Float64) -> None:
+    """Turn joints about the first of them, in place, by a vector (3,)."""
+    angle = _length(turn)
+    if angle < 1e-12:
         return
-    angle = size / (1.0 + size / largest)
-    x, y, z = turn[0] / size, turn[1] / size, turn[2] / size
-    turns[0] += angle * x
-    turns[1] += angle * y
-    turns[2] += angle * z
+    x, y, z = turn / angle
     sine, cosine = np.sin(angle), np.cos(angle)
     first = joints[0]
     px, py, pz = matrices[first, 0, 3], matrices[first, 1, 3], matrices[first, 2, 3]

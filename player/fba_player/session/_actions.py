@@ -67,6 +67,8 @@ def _orbit(session: Session) -> None:
 
 def _lanes(session: Session) -> None:
     session.lanes = LANES[(LANES.index(session.lanes) + 1) % len(LANES)]
+    if session.memory is not None:
+        session.memory.welcome()  # who has found the lanes needs no hint at them
     session.say(f"lanes of the timeline: {LANE_TEXTS[session.lanes]}", about="lanes")
 
 

@@ -167,7 +167,7 @@ class GlfwInput:
         if word is None:
             return None
         control = modifiers & (glfw.MOD_CONTROL | glfw.MOD_SUPER)
-        shift = modifiers & glfw.MOD_SHIFT and (control or len(word) > 1)
+        shift = modifiers & glfw.MOD_SHIFT and (control or len(word) > 1) and word != "+"  # it makes the plus
         return ("ctrl+" if control else "") + ("shift+" if shift else "") + word
 
     def pixels(self, x: float, y: float) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from fba_player.scene.scene import SWITCHES, Scene
 from fba_player.session._camera_controller import GLIDE_SECONDS
 from fba_player.session._controls import Controls
 from fba_player.session._keys import by_name
+from fba_player.session._memory import Memory
 from fba_player.session._session import Session
 from fba_player.view._camera import Camera, Subject
 
@@ -86,6 +88,13 @@ def test_only_some_keys_repeat_while_held(controls: Controls) -> None:
     assert not controls.key("space", held=True)
     assert not controls.session.transport.playing
     assert not controls.key("w", held=True)
+
+
+def test_who_finds_the_lanes_is_greeted_no_more(controls: Controls, tmp_path: Path) -> None:
+    controls.session.memory = Memory(tmp_path)
+    controls.key("t")
+    assert controls.session.lanes == "all"
+    assert Memory(tmp_path).welcomed
 
 
 def test_panels_closing_and_wishes(controls: Controls) -> None:

@@ -107,6 +107,10 @@ def test_keys_play_step_and_stop(window: Window, hand: Hand) -> None:
     assert transport.frame > 3  # stopped, it stays
     hand.key("plus", lambda: transport.speed == 1.25)
     hand.key("minus", lambda: transport.speed == 1.0)
+    zoom = window.session.zoom
+    whole = zoom.high - zoom.low
+    hand.key("ctrl+plus", lambda: zoom.high - zoom.low < whole)
+    hand.key("ctrl+0", lambda: zoom.high - zoom.low == whole)
 
 
 def test_marks_by_keys_loop_the_range(window: Window, hand: Hand) -> None:
