@@ -125,12 +125,12 @@ class Details:
                 (one.shape.looks, other.shape.looks),
             )
         ]
-        return replace(one, positions=arrays[0], normals=arrays[1], light=arrays[2], looks=arrays[3])
+        return one._replace(positions=arrays[0], normals=arrays[1], light=arrays[2], looks=arrays[3])
 
     def _carry(self, mesh: FaceMesh, number: int, away: float) -> FaceMesh:
         """Return a part of a face at a level of detail, moved by the vertices of the full one."""
         if not number:
-            return replace(mesh, away=away)
+            return mesh._replace(away=away)
         level = mesh.shape.levels[number - 1]
         before = self._lights.get(level.shape)
         if before is None or not share_memory(before[0], mesh.light):
@@ -139,8 +139,8 @@ class Details:
         normals = _mean(mesh.normals, level.rows, level.weights)
         positions = _mean(mesh.positions, level.rows, level.weights)
         positions += level.heights[:, None] * normals
-        return replace(
-            mesh, shape=level.shape, positions=positions, normals=normals, light=before[1], away=away
+        return mesh._replace(
+            shape=level.shape, positions=positions, normals=normals, light=before[1], away=away
         )
 
     def _choose(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
@@ -153,8 +153,7 @@ class Details:
             return mesh
         if level.light is None or not share_memory(level.light[0], mesh.light):
             level.light = (mesh.light, mesh.light.take(level.rows, axis=0))
-        return replace(
-            mesh,
+        return mesh._replace(
             shape=level.shape,
             positions=mesh.positions.take(level.rows, axis=0),
             normals=mesh.normals.take(level.rows, axis=0),

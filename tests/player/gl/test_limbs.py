@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ def test_a_limb_before_a_wall_takes_its_key_light(context: Any) -> None:
     arm = 0.25 * np.array(KEY_DIRECTION) / np.linalg.norm(KEY_DIRECTION)
     limbs = np.float32([(arm[0] + aside, arm[1], arm[2], 0.04) for aside in (-0.3, 0.3)])
     free, before, beside = (
-        draw(context, replace(wall, limbs=each)) for each in (None, limbs, limbs + np.float32([0, 3, 0, 0]))
+        draw(context, wall._replace(limbs=each)) for each in (None, limbs, limbs + np.float32([0, 3, 0, 0]))
     )
     middle = SIZE // 2
     assert before[middle, middle] < 0.7 * free[middle, middle]
