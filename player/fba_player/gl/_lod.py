@@ -231,10 +231,12 @@ def _add_means(values: Float32, rows: Int32, weights: Float32, means: Float32) -
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """Return the distance from an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
     sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED_VERTICES, 1)]
-    away = sample @ mesh.matrix[:3, :3].T + (mesh.matrix[:3, 3] - eye)
-    scale = float(mesh.matrix[:3, 0] @ mesh.matrix[:3, 0])
+    squared = float(mesh.matrix[:3, 0] @ mesh.matrix[:3, 0])  # of the scale
+    if not squared > 0:
+        return 0.0
+    away = sample - (eye - mesh.matrix[:3, 3]) @ mesh.matrix[:3, :3] / squared
     least = float(np.einsum("ij,ij->i", away, away).min(initial=np.inf))
-    return math.sqrt(least / scale) if math.isfinite(least) and scale > 0 else 0.0
+    return math.sqrt(least) if math.isfinite(least) else 0.0
 
 
 def share_memory(one: Float32, other: Float32) -> bool:

@@ -31,6 +31,8 @@ MIN_WRINKLE = 0.01
 """Strength from which wrinkles are drawn."""
 MIN_RELIEF = 0.25
 """The skin's relief is not drawn if it is reduced to less than this share of its size."""
+PARTS_AT_ONCE = 10
+"""Parts after which software OpenGL begins to fill pixels."""
 FAR = -1e4
 """Place (m) along each axis of limbs that a body lacks: away from the light."""
 
@@ -46,6 +48,7 @@ class FaceRenderer:
         self._wrinkles: dict[int, Any] = {}
         self._pixels: UInt8 | None = None
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
+        self._aside = context.simple_framebuffer((1, 1))
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float) -> None:
         """Set the camera: its position (3,), the matrix (4, 4) to clip space, a pixel's size."""
@@ -58,9 +61,13 @@ class FaceRenderer:
     def draw(self, meshes: list[FaceMesh]) -> None:
         """Draw parts, the transparent ones last."""
         gl = self._gl
-        for mesh in meshes:
-            if not mesh.shape.see_through:
-                self._draw(mesh)
+        opaque = [mesh for mesh in meshes if not mesh.shape.see_through]
+        for number, mesh in enumerate(opaque, 1):
+            self._draw(mesh)
+            if number % PARTS_AT_ONCE == 0:
+                # Software OpenGL collects triangles until another framebuffer is used, then fills pixels in
+                # threads of its own, while this one draws on. It slows down with what it has collected.
+                self._aside.clear()
         transparent = [mesh for mesh in meshes if mesh.shape.see_through]
         for mesh in transparent:  # pixels that are nearly opaque hide what is behind them, in any order
             if mesh.shape.alpha == "blend":
@@ -76,7 +83,12 @@ class FaceRenderer:
 
     def close(self) -> None:
         self._shapes.clear()
-        for part in (*self._reliefs.values(), *self._wrinkles.values(), *self._programs.values()):
+        for part in (
+            *self._reliefs.values(),
+            *self._wrinkles.values(),
+            *self._programs.values(),
+            self._aside,
+        ):
             part.release()
         self._reliefs.clear()
         self._wrinkles.clear()
@@ -154,8 +166,6 @@ class FaceRenderer:
         _set_pose(program, mesh)
         if "CUT" in options:
             set_uniform(program, "cut", CORE_OPACITY if core else shape.cutoff)
-        if mesh.limbs is not None:
-            set_uniform(program, "limbs", _padded(mesh.limbs))
         if picture is not None:
             picture.use(0)
         if repeats is not None:
@@ -233,8 +243,8 @@ def _set_shape(program: Any, shape: FaceShape) -> None:
 
 
 def _set_pose(program: Any, mesh: FaceMesh) -> None:
-    """Set the uniforms for a mesh's position and turn, unless the program has them already."""
-    pose = (mesh.matrix, mesh.turn, mesh.centre)
+    """Set the uniforms for a mesh's position, turn and limbs, unless the program has them already."""
+    pose = (mesh.matrix, mesh.turn, mesh.centre, mesh.limbs)
     before = program.extra.get("pose")
     if before is not None and all(now is then for now, then in zip(pose, before, strict=True)):
         return
@@ -242,6 +252,8 @@ def _set_pose(program: Any, mesh: FaceMesh) -> None:
     set_uniform(program, "world", matrix_bytes(mesh.matrix))
     set_uniform(program, "turn", tuple(mesh.turn.tolist()))
     set_uniform(program, "centre", tuple(mesh.centre.tolist()))
+    if mesh.limbs is not None:
+        set_uniform(program, "limbs", _padded(mesh.limbs))
 
 
 def _padded(limbs: Float32) -> bytes:
