@@ -74,7 +74,7 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
     """Return the indices (M,) of names for which there is room, and their upper left corners (M, 2), pixels.
 
     dots: (N, 2), pixels from the upper left, NaN for hidden ones. sizes: (N, 2), of the names. Each name is
-    beside its dot, or above its point if radius is 0, in rows where they are close, and none overlaps another.
+    beside its dot, or above its point if radius is 0, in rows where they are close; none overlaps another.
     Nothing is drawn if the picture has more than `MAX_NAMES` dots.
     """
     inside = np.isfinite(dots).all(axis=1) & ((dots >= 0) & (dots < size)).all(axis=1)
