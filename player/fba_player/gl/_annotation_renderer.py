@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fba.arrays import Array, Float32, Float64, UInt8
+from fba.arrays import Array, Float32, Float64, Int64, UInt8
 from fba_player.gl._labels import (
     MAX_NAMES,
     MIN_LEGEND_HEIGHT,
@@ -71,7 +71,6 @@ class ExtrasRenderer:
         self._square: Any = None
         self._buffers: dict[str, Any] = {}
         self._labels = RecentlyUsed[tuple[Any, Any]](CACHED_LABELS, lambda label: label[0].release())
-        self._depths: Float32 | None = None
         self._triangles = RecentlyUsed[Any](CACHED_SHELLS, lambda triangles: triangles.release())
 
     def draw(self, extras: Extras, camera: Camera, size: tuple[int, int]) -> None:
@@ -99,7 +98,6 @@ class ExtrasRenderer:
             if dots.radius > 0:
                 self._draw_dots(dots, scale, _pixels_per_metre(dots, camera, size))
         gl.enable_only(gl.BLEND)
-        self._depths = None
         if size[1] >= MIN_NAMES_HEIGHT:
             for dots in extras.dots:
                 if any(dots.names):
@@ -214,8 +212,7 @@ class ExtrasRenderer:
         inside = facing & np.isfinite(depth) & ((pixel >= 0) & (pixel < size)).all(axis=1)
         if not 0 < inside.sum() <= MAX_NAMES:
             return
-        column, row = pixel[inside].astype(int).T
-        inside[inside] = nearer[inside] <= self._depths_of(size)[size[1] - 1 - row, column]
+        inside[inside] = nearer[inside] <= self._depths_at(pixel[inside].astype(int), size)
         pixel[~inside] = np.nan
         shown, corners = place_names(pixel, boxes[:, 2:], dots.radius * scale, size)
         if len(shown):
@@ -230,21 +227,23 @@ class ExtrasRenderer:
         if wide + 2 * edge <= size[0]:
             self._draw_labels(texture, np.array([[edge, edge, wide, high, 0.0, 0.0, 1.0, 1.0]]))
 
-    def _depths_of(self, size: tuple[int, int]) -> Float32:
-        """Return float32 (H, W): depths of the picture, 0..1, bottom row first; read once a picture."""
-        if self._depths is not None:
-            return self._depths
+    def _depths_at(self, pixels: Int64, size: tuple[int, int]) -> Float32:
+        """Return float32 (N,): depths of the picture, 0..1, at pixels (N, 2) from the upper left."""
         gl, source, parts = self._gl, self._gl.fbo, []
         if source.samples:
             parts = [gl.renderbuffer(size, 4), gl.depth_renderbuffer(size)]
             parts.append(gl.framebuffer(parts[:1], parts[1]))
             gl.copy_framebuffer(parts[2], source)
-        data = (parts[2] if parts else source).read(components=1, attachment=-1, dtype="f4")
+        at = np.stack([pixels[:, 0], size[1] - 1 - pixels[:, 1]], axis=1)
+        low = at.min(axis=0)  # only the rectangle with all of them is read
+        width, height = (at.max(axis=0) - low + 1).tolist()
+        within = (*low.tolist(), width, height)
+        data = (parts[2] if parts else source).read(within, components=1, attachment=-1, dtype="f4")
         source.use()
         for part in reversed(parts):
             part.release()
-        self._depths = np.frombuffer(data, dtype=np.float32).reshape(size[1], size[0])
-        return self._depths
+        column, row = (at - low).T
+        return np.asarray(np.frombuffer(data, dtype=np.float32).reshape(height, width)[row, column])
 
     def _label(self, key: Hashable, make: Callable[[], tuple[UInt8, Any]]) -> tuple[Any, Any]:
         """Return a texture of labels, cached, and what `make` returned with its picture."""

@@ -30,12 +30,12 @@ Rectangle = tuple[int, int, int, int]
 class Steps:
     """The regions of a picture to be smoothed.
 
-    rectangles: left, bottom, width and height in pixels. bands: float32 (N, 2), corners of triangles that do
-    not overlap, -1..1 across the picture.
+    rectangles: left, bottom, width and height in pixels. tiles: float32 (N, 2), middles of squares of `TILE`
+    pixels, -1..1 across the picture.
     """
 
     rectangles: list[Rectangle]
-    bands: Float32
+    tiles: Float32
 
 
 def find_steps(view: View, matrix: Float64, size: tuple[int, int], outliner: Outliner) -> Steps:

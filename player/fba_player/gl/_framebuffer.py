@@ -16,6 +16,7 @@ from fba.errors import DisplayError
 from fba_player.gl._antialias_region import Steps
 from fba_player.gl._context import import_moderngl
 from fba_player.gl._resources import load_program, make_buffer, write_buffer
+from fba_player.gl._silhouette import TILE
 
 
 class Target:
@@ -51,7 +52,7 @@ class Target:
         self._result = self._own(gl.framebuffer([self._own(gl.renderbuffer(size, 4))]))
         depth = self._own(gl.depth_renderbuffer(size, samples=samples))
         self._pass: Any = None
-        self._bands: Any = None
+        self._tiles: Any = None
         self._along: Any = None
         if samples:
             colour = self._own(gl.renderbuffer(size, 4, samples=samples))
@@ -103,14 +104,14 @@ class Target:
             self._gl.scissor = rectangle
             self._pass.render()
         self._gl.scissor = None
-        if within is not None and len(within.bands) and everything not in rectangles:
-            data = np.ascontiguousarray(within.bands, dtype="f4")
-            if self._bands is None or self._bands.size < data.nbytes:
-                self._bands = self._own(self._gl.buffer(reserve=2 * data.nbytes, dynamic=True))
-                content = [(self._bands, "2f", "in_corner")]
+        if within is not None and len(within.tiles) and everything not in rectangles:
+            if self._tiles is None or self._tiles.size < within.tiles.nbytes:
+                self._tiles = self._own(self._gl.buffer(reserve=2 * within.tiles.nbytes, dynamic=True))
+                content = [(self._tiles, "2f", "in_corner")]
                 self._along = self._own(self._gl.vertex_array(self._program, content))
-            write_buffer(self._bands, data)
-            self._along.render(vertices=len(data))
+            write_buffer(self._tiles, within.tiles)
+            self._gl.point_size = TILE
+            self._along.render(self._gl.POINTS, vertices=len(within.tiles))
         return result
 
     def close(self) -> None:

@@ -82,7 +82,7 @@ class GroundShadow:
         target.use()
         gl.viewport = viewport
         gl.enable_only(gl.BLEND)
-        gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
+        gl.blend_func = gl.ZERO, gl.SRC_COLOR
         self._darkness.use(0)
         for name, value in (("camera", camera), ("low", low), ("width", width)):
             set_uniform(self._programs["cast"], name, value)

@@ -20,6 +20,8 @@ MAX_NAMES = 45
 """If more points are in view, none is named."""
 NAME_GAP = 2.0
 """Pixels between a dot and its name."""
+NAME_ROWS = 4
+"""Names alone stand above each other, in so many rows, where they would overlap."""
 
 
 def legend_picture(legend: Legend, scale: float) -> UInt8:
@@ -72,8 +74,8 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
     """Return the indices (M,) of names for which there is room, and their upper left corners (M, 2), pixels.
 
     dots: (N, 2), pixels from the upper left, NaN for hidden ones. sizes: (N, 2), of the names. Each name is
-    beside its dot, or above its point if radius is 0, and none overlaps another. Nothing is drawn if the
-    picture has more than `MAX_NAMES` dots.
+    beside its dot, or above its point if radius is 0, in rows where they are close; none overlaps another.
+    Nothing is drawn if the picture has more than `MAX_NAMES` dots.
     """
     inside = np.isfinite(dots).all(axis=1) & ((dots >= 0) & (dots < size)).all(axis=1)
     if inside.sum() > MAX_NAMES:
@@ -83,7 +85,8 @@ def place_names(dots: Float64, sizes: Int64, radius: float, size: tuple[int, int
     shown, corners = [], []
     for number in np.flatnonzero(inside):
         (x, y), (wide, high) = dots[number], sizes[number]
-        above = [(min(max(x - wide / 2, 0.0), size[0] - wide), y - high)] if radius == 0 else []
+        middle = min(max(x - wide / 2, 0.0), size[0] - wide)
+        above = [(middle, y - high * row) for row in range(1, NAME_ROWS + 1)] if radius == 0 else []
         beside = [(x + reach, y - high / 2), (x - reach - wide, y - high / 2)]
         beyond = [(x - wide / 2, y - reach - high), (x - wide / 2, y + reach)]
         for left, top in (*above, *beside, *beyond):

@@ -125,12 +125,12 @@ class Details:
                 (one.shape.looks, other.shape.looks),
             )
         ]
-        return replace(one, positions=arrays[0], normals=arrays[1], light=arrays[2], looks=arrays[3])
+        return one._replace(positions=arrays[0], normals=arrays[1], light=arrays[2], looks=arrays[3])
 
     def _carry(self, mesh: FaceMesh, number: int, away: float) -> FaceMesh:
         """Return a part of a face at a level of detail, moved by the vertices of the full one."""
         if not number:
-            return replace(mesh, away=away)
+            return mesh._replace(away=away)
         level = mesh.shape.levels[number - 1]
         before = self._lights.get(level.shape)
         if before is None or not share_memory(before[0], mesh.light):
@@ -139,8 +139,8 @@ class Details:
         normals = _mean(mesh.normals, level.rows, level.weights)
         positions = _mean(mesh.positions, level.rows, level.weights)
         positions += level.heights[:, None] * normals
-        return replace(
-            mesh, shape=level.shape, positions=positions, normals=normals, light=before[1], away=away
+        return mesh._replace(
+            shape=level.shape, positions=positions, normals=normals, light=before[1], away=away
         )
 
     def _choose(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
@@ -153,8 +153,7 @@ class Details:
             return mesh
         if level.light is None or not share_memory(level.light[0], mesh.light):
             level.light = (mesh.light, mesh.light.take(level.rows, axis=0))
-        return replace(
-            mesh,
+        return mesh._replace(
             shape=level.shape,
             positions=mesh.positions.take(level.rows, axis=0),
             normals=mesh.normals.take(level.rows, axis=0),
@@ -232,10 +231,12 @@ def _add_means(values: Float32, rows: Int32, weights: Float32, means: Float32) -
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """Return the distance from an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
     sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED_VERTICES, 1)]
-    away = sample @ mesh.matrix[:3, :3].T + (mesh.matrix[:3, 3] - eye)
-    scale = float(mesh.matrix[:3, 0] @ mesh.matrix[:3, 0])
+    squared = float(mesh.matrix[:3, 0] @ mesh.matrix[:3, 0])  # of the scale
+    if not squared > 0:
+        return 0.0
+    away = sample - (eye - mesh.matrix[:3, 3]) @ mesh.matrix[:3, :3] / squared
     least = float(np.einsum("ij,ij->i", away, away).min(initial=np.inf))
-    return math.sqrt(least / scale) if math.isfinite(least) and scale > 0 else 0.0
+    return math.sqrt(least) if math.isfinite(least) else 0.0
 
 
 def share_memory(one: Float32, other: Float32) -> bool:

@@ -34,6 +34,8 @@ MIN_RELIEF = 0.25
 """The skin's relief is not drawn if it is reduced to less than this share of its size."""
 CLEAR, CLEAR_OF_FACES = 0.014, 0.07
 """Metres by which what throws a shadow on a surface must be off it; faces come with shadows of their own."""
+PARTS_AT_ONCE = 10
+"""Parts after which software OpenGL begins to fill pixels."""
 FAR = -1e4
 """Place (m) along each axis of limbs that a body lacks: away from the light."""
 
@@ -50,6 +52,7 @@ class FaceRenderer:
         self._pixels: UInt8 | None = None
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
         self._shade: Shade | None = None
+        self._aside = context.simple_framebuffer((1, 1))
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float, shade: Shade | None = None) -> None:
         """Set the camera: its position (3,), the matrix (4, 4) to clip space, a pixel's size; and shadows."""
@@ -63,9 +66,13 @@ class FaceRenderer:
     def draw(self, meshes: list[FaceMesh]) -> None:
         """Draw parts, the transparent ones last."""
         gl = self._gl
-        for mesh in meshes:
-            if not mesh.shape.see_through:
-                self._draw(mesh)
+        opaque = [mesh for mesh in meshes if not mesh.shape.see_through]
+        for number, mesh in enumerate(opaque, 1):
+            self._draw(mesh)
+            if number % PARTS_AT_ONCE == 0:
+                # Software OpenGL collects triangles until another framebuffer is used, then fills pixels in
+                # threads of its own, while this one draws on. It slows down with what it has collected.
+                self._aside.clear()
         transparent = [mesh for mesh in meshes if mesh.shape.see_through]
         for mesh in transparent:  # pixels that are nearly opaque hide what is behind them, in any order
             if mesh.shape.alpha == "blend":
@@ -81,7 +88,12 @@ class FaceRenderer:
 
     def close(self) -> None:
         self._shapes.clear()
-        for part in (*self._reliefs.values(), *self._wrinkles.values(), *self._programs.values()):
+        for part in (
+            *self._reliefs.values(),
+            *self._wrinkles.values(),
+            *self._programs.values(),
+            self._aside,
+        ):
             part.release()
         self._reliefs.clear()
         self._wrinkles.clear()
@@ -161,8 +173,6 @@ class FaceRenderer:
         _set_pose(program, mesh)
         if "CUT" in options:
             set_uniform(program, "cut", CORE_OPACITY if core else shape.cutoff)
-        if mesh.limbs is not None:
-            set_uniform(program, "limbs", _padded(mesh.limbs))
         if self._shade is not None:
             self._shade.tops.use(3)
             set_uniform(program, "tops", 3)
@@ -245,8 +255,8 @@ def _set_shape(program: Any, shape: FaceShape) -> None:
 
 
 def _set_pose(program: Any, mesh: FaceMesh) -> None:
-    """Set the uniforms for a mesh's position and turn, unless the program has them already."""
-    pose = (mesh.matrix, mesh.turn, mesh.centre)
+    """Set the uniforms for a mesh's position, turn and limbs, unless the program has them already."""
+    pose = (mesh.matrix, mesh.turn, mesh.centre, mesh.limbs)
     before = program.extra.get("pose")
     if before is not None and all(now is then for now, then in zip(pose, before, strict=True)):
         return
@@ -254,6 +264,8 @@ def _set_pose(program: Any, mesh: FaceMesh) -> None:
     set_uniform(program, "world", matrix_bytes(mesh.matrix))
     set_uniform(program, "turn", tuple(mesh.turn.tolist()))
     set_uniform(program, "centre", tuple(mesh.centre.tolist()))
+    if mesh.limbs is not None:
+        set_uniform(program, "limbs", _padded(mesh.limbs))
 
 
 def _padded(limbs: Float32) -> bytes:

@@ -67,7 +67,8 @@ class Renderer:
         self._instances = context.buffer(reserve=CAPSULE_FLOATS * 4 * 128, dynamic=True)
         self._capsule_parts = _make_buffers(context, *capsule_mesh())
         self._capsules = self._capsule_array()
-        self._eye_parts = _make_buffers(context, *sphere_mesh())
+        vertices, inward = sphere_mesh()
+        self._eye_parts = _make_buffers(context, vertices, inward[:, ::-1])
         points, triangles = self._eye_parts
         attributes = [(points, "3f", "in_position")]
         self._eye = context.vertex_array(self._programs["eye"], attributes, index_buffer=triangles)
@@ -110,8 +111,8 @@ class Renderer:
         gl.fbo.clear(1.0, 1.0, 1.0, 1.0)
         gl.fbo.scissor = None
         self._details.morphing |= morphing
-        bands = np.concatenate([steps.bands, others.bands])
-        return Steps([*steps.rectangles, *others.rectangles], bands)
+        tiles = np.concatenate([steps.tiles, others.tiles])
+        return Steps([*steps.rectangles, *others.rectangles], tiles)
 
     def _draw_whole(
         self, view: View, camera: Camera, size: tuple[int, int], now: float | None, *, smoothed: bool
@@ -132,10 +133,13 @@ class Renderer:
             self._draw_mesh(mesh)
         self._draw_capsules(view.capsules)
         self._draw_marks(view.marks)
-        for ball in view.eyes:
-            self._draw_eye(ball)
         self._faces.begin(eye, matrix, pixel, shade and shade._replace(finely=not smoothed))
-        self._faces.draw(drawn.faces)
+        self._faces.draw([mesh for mesh in drawn.faces if not mesh.shape.see_through])
+        gl.enable(gl.CULL_FACE)
+        for ball in view.eyes:  # after the skin, which hides most of them, and before lashes
+            self._draw_eye(ball)
+        gl.disable(gl.CULL_FACE)
+        self._faces.draw([mesh for mesh in drawn.faces if mesh.shape.see_through])
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
         if not smoothed:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -43,7 +42,7 @@ class DifferenceColours:
             shape = self._shapes[mesh.shape]
             looks = shape.looks.copy()
             looks[:, :3] = linear_light(heat_colours(np.minimum(away / most, 1.0)))
-            painted.append(replace(mesh, shape=shape, looks=looks))
+            painted.append(mesh._replace(shape=shape, looks=looks))
         return painted
 
 

@@ -131,13 +131,11 @@ class DisplayOptions:
         if "eye" in hidden:
             view = replace(view, eyes=[])
         if not switches["wrinkles"]:
-            view = replace(view, faces=[replace(mesh, wrinkles=None) for mesh in view.faces])
+            view = replace(view, faces=[mesh._replace(wrinkles=None) for mesh in view.faces])
         if not switches["shadows"]:
             unshaded = np.array(UNSHADED, dtype=np.float32)
             faces = [
-                replace(
-                    mesh, light=np.broadcast_to(unshaded, (len(mesh.positions), len(unshaded))), limbs=None
-                )
+                mesh._replace(light=np.broadcast_to(unshaded, (len(mesh.positions), 4)), limbs=None)
                 for mesh in view.faces
             ]
             view = replace(view, faces=faces, blobs=view.blobs[:0])

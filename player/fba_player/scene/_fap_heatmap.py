@@ -50,7 +50,7 @@ class FapHeatmap:
 
     def paint(self, meshes: list[FaceMesh]) -> list[FaceMesh]:
         """Return the meshes in these colours; parts that are not the face's get the colour of 0."""
-        return [replace(mesh, shape=self._shape(mesh)) for mesh in meshes]
+        return [mesh._replace(shape=self._shape(mesh)) for mesh in meshes]
 
     def eyes(self, eyes: list[Eye]) -> list[Mesh]:
         """Return the eyeballs as meshes in these colours."""

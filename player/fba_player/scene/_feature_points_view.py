@@ -87,7 +87,7 @@ class PointView:
             if id(mesh.shape) not in self._dull_shapes:
                 levels = tuple(replace(level, shape=_dull(level.shape)) for level in mesh.shape.levels)
                 self._dull_shapes[id(mesh.shape)] = replace(_dull(mesh.shape), levels=levels)
-            meshes.append(replace(mesh, shape=self._dull_shapes[id(mesh.shape)]))
+            meshes.append(mesh._replace(shape=self._dull_shapes[id(mesh.shape)]))
         return meshes
 
     def meshes(self, faps: Float32, matrix: Float64) -> list[Mesh]:

@@ -30,8 +30,8 @@ def move_view(view: View, offset: Float64) -> View:
     return replace(
         view,
         meshes=[replace(mesh, matrix=shift @ mesh.matrix) for mesh in view.meshes],
-        faces=[replace(mesh, matrix=shift @ mesh.matrix) for mesh in view.faces],
-        eyes=[replace(eye, matrix=shift @ eye.matrix) for eye in view.eyes],
+        faces=[mesh._replace(matrix=shift @ mesh.matrix) for mesh in view.faces],
+        eyes=[eye._replace(matrix=shift @ eye.matrix) for eye in view.eyes],
         capsules=_move_capsules(view.capsules, offset),
         marks=_move_capsules(view.marks, offset),
         blobs=view.blobs + flat if len(view.blobs) else view.blobs,
@@ -106,10 +106,10 @@ class Drawing:
         return painted
 
 
-def make_caption(text: str, position: Float64) -> Dots:
-    """Return a label at a point."""
-    points = np.asarray(position, dtype=np.float32)[None]
-    return Dots(points, (1.0, 1.0, 1.0, 1.0), 0.0, 1.0, (text,), np.zeros((1, 3), np.float32))
+def make_captions(texts: tuple[str, ...], positions: Float64) -> Dots:
+    """Return labels at points (N, 3)."""
+    points = positions.astype(np.float32)
+    return Dots(points, (1.0, 1.0, 1.0, 1.0), 0.0, 1.0, texts, np.zeros_like(points))
 
 
 def _move_capsules(capsules: Float32, offset: Float64) -> Float32:
@@ -131,6 +131,6 @@ def _move_extras(extras: Extras, offset: Float64) -> Extras:
         extras,
         lines=tuple(replace(lines, ends=np.asarray(lines.ends + by)) for lines in extras.lines),
         dots=tuple(replace(dots, positions=dots.positions + by) for dots in extras.dots),
-        shells=tuple(replace(mesh, matrix=shift @ mesh.matrix) for mesh in extras.shells),
+        shells=tuple(mesh._replace(matrix=shift @ mesh.matrix) for mesh in extras.shells),
         grid=grid,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ from fba_player.scene._difference_colours import DifferenceColours, distances, r
 from fba_player.scene._differences import Differences, differences
 from fba_player.scene._display_options import HAIRS
 from fba_player.scene._fap_heatmap import heat_legend
-from fba_player.scene._layout import Drawing, join_views, make_caption, move_view
+from fba_player.scene._layout import Drawing, join_views, make_captions, move_view
 from fba_player.scene.scene import Scene
 from fba_player.view._camera import FACE_PRESETS, PRESETS, Camera, Subject
 from fba_player.view._view import Extras, View, Wipe
@@ -210,8 +210,8 @@ class CompareScene(Timed[CompareTimeline]):
                 faces = self._colours.paint(faces, views[0].faces, offset, most)
                 views[number] = replace(views[number], faces=faces)
         for number, view in enumerate(views):
-            views[number] = self._captioned(number, move_view(view, self._placed(number, times)), times)
-        joined = join_views(views)
+            views[number] = move_view(view, self._placed(number, times))
+        joined = self._captioned(join_views(views), range(len(views)), times)
         if not most:
             return joined
         legend = heat_legend("Difference", "mm from the first", most * 1000)
@@ -229,26 +229,30 @@ class CompareScene(Timed[CompareTimeline]):
     def _in_a_row(self) -> bool:
         return self._arrangement in ("side", "colour")
 
-    def _captioned(self, number: int, view: View, times: list[float]) -> View:
-        """Return the moved view of a scene with its name above the head."""
-        if not self.names[number] or len(self.scenes) < 2:
+    def _captioned(self, view: View, numbers: Iterable[int], times: list[float]) -> View:
+        """Return the view of moved scenes with their names above the heads."""
+        named = [number for number in numbers if self.names[number]]
+        if not named or len(self.scenes) < 2:
             return view
-        head = self._heads[number]
-        x, y, z = head.centre
-        place = np.array([x, y + head.half_height * CAPTION_HEIGHT, z]) + self._shift(number)
-        if self._arrangement == "wipe":
-            aside = SHOULDER_HALF_WIDTH if self.scenes[number].has_body else head.half_width
-            place = place + self._right() * aside * (1.0 if number else -1.0)
-        caption = make_caption(self.names[number], place + np.array(self.scenes[0].travel(times[0])))
+        places = np.empty((len(named), 3))
+        for row, number in enumerate(named):
+            head = self._heads[number]
+            places[row] = self._shift(number) + head.centre
+            places[row, 1] += head.half_height * CAPTION_HEIGHT
+            if self._arrangement == "wipe":
+                aside = SHOULDER_HALF_WIDTH if self.scenes[number].has_body else head.half_width
+                places[row] += self._right() * aside * (1.0 if number else -1.0)
+        names = tuple(self.names[number] for number in named)
+        captions = make_captions(names, places + self.scenes[0].travel(times[0]))
         extras = view.extras or Extras()
-        return replace(view, extras=replace(extras, dots=(*extras.dots, caption)))
+        return replace(view, extras=replace(extras, dots=(*extras.dots, captions)))
 
     def _wiped(self, times: list[float]) -> View:
         """Return the first scene, and the second one in its place on the right of the line."""
         views = []
         for number in (0, min(self.second, len(self.scenes) - 1)):
             view = move_view(self.scenes[number].view_at(times[number]), self._placed(number, times))
-            views.append(self._captioned(number, view, times))
+            views.append(self._captioned(view, [number], times))
         return replace(views[0], wipe=Wipe(views[1], min(max(self.wipe, 0.0), 1.0)))
 
     def _placed(self, number: int, times: list[float]) -> Float64:

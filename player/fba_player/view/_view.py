@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -141,8 +141,7 @@ class CoarseShape:
         return first
 
 
-@dataclass(frozen=True, eq=False)
-class FaceMesh:
+class FaceMesh(NamedTuple):
     """A part of a face in one pose.
 
     positions, normals: float32 (V, 3), without the head's rotation. light: float32 (V, 4), 0..1, the share of
@@ -170,8 +169,7 @@ class FaceMesh:
     limbs: Float32 | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Eye:
+class Eye(NamedTuple):
     """An eyeball. matrix: (4, 4), from its own frame (looking along +z, radius 1) into the world.
 
     iris, pupil: radii as fractions of the eyeball's. lids: (4, 3), the middles of the upper and lower lid

@@ -112,7 +112,7 @@ def test_two_persons_with_one_face_have_levels_of_their_own(figure: FaceFigure) 
     here = meshes(figure)
     matrix = np.eye(4)
     matrix[2, 3] = -8.0
-    there = [replace(mesh, matrix=matrix) for mesh in here]
+    there = [mesh._replace(matrix=matrix) for mesh in here]
     drawn = Details().choose([*here, *there], NEAR, PIXEL)
     assert drawn[0].shape is here[0].shape
     assert drawn[len(here)].shape is here[0].shape.levels[1].shape

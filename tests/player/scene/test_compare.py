@@ -137,7 +137,7 @@ def test_two_heads_stand_apart_and_are_those_of_their_scenes(pair: CompareScene)
     count = len(alone[0].faces)
     for mesh, own in zip(view.faces[count:], alone[1].faces, strict=True):
         np.testing.assert_array_equal(mesh.positions, own.positions)
-    assert [dots.names for dots in view.extras.dots] == [("rest",), ("open",)]  # type: ignore[union-attr]
+    assert [dots.names for dots in view.extras.dots] == [("rest", "open")]  # type: ignore[union-attr]
 
 
 def test_in_profile_they_stand_beside_each_other_as_the_camera_sees_them(pair: CompareScene) -> None:

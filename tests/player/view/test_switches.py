@@ -293,6 +293,12 @@ class TestNames:
             _, corners = place_names(np.array([[x, 50.0]]), sizes, 0.0, (200, 100))
             assert corners.tolist() == [[left, 38.0]]
 
+    def test_names_of_close_points_stand_in_rows(self) -> None:
+        dots = np.array([[50.0, 50.0], [60.0, 50.0], [100.0, 50.0]])
+        shown, corners = place_names(dots, np.full((3, 2), (30, 12)), 0.0, (200, 100))
+        assert shown.tolist() == [0, 1, 2]
+        assert corners.tolist() == [[35, 38], [45, 26], [85, 38]]
+
     def test_with_many_points_in_view_no_point_is_named(self) -> None:
         dots = np.stack(np.meshgrid(np.arange(10) * 40.0, np.arange(10) * 40.0), axis=-1).reshape(-1, 2)
         assert len(place_names(dots, np.full((100, 2), 10), 3.0, (400, 400))[0]) == 0
