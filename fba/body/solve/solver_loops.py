@@ -70,9 +70,13 @@ def _nearest(angle: float, wanted: float) -> float:
 
 
 @inlined
-def _excess(angle: float, bounds: Float64) -> float:
-    """Return the amount by which an angle is outside bounds (2,), 0 inside."""
-    return max(0.0, bounds[0] - angle, angle - bounds[1])
+def _excess(x: float, y: float, z: float, limits: Float64) -> float:
+    """Return the amount by which three angles are outside limits (3, 2), 0 inside."""
+    return (
+        max(0.0, limits[0, 0] - x, x - limits[0, 1])
+        + max(0.0, limits[1, 0] - y, y - limits[1, 1])
+        + max(0.0, limits[2, 0] - z, z - limits[2, 1])
+    )
 
 
 class Scratch(NamedTuple):
@@ -209,14 +213,7 @@ def _angles(
                 here = (x - first) ** 2 + (y - second) ** 2 + (z - third) ** 2
                 other = (u - first) ** 2 + (v - second) ** 2 + (w - third) ** 2
                 if bounded and f == 0:
-                    out = (
-                        _excess(x, limits[0])
-                        + _excess(y, limits[1])
-                        + _excess(z, limits[2])
-                        - _excess(u, limits[0])
-                        - _excess(v, limits[1])
-                        - _excess(w, limits[2])
-                    )
+                    out = _excess(x, y, z, limits) - _excess(u, v, w, limits)
                     if abs(out) > UNIT:  # one of them leaves the limits by more
                         here = out
                         other = 0.0
