@@ -72,11 +72,10 @@ def _nearest(angle: float, wanted: float) -> float:
 @inlined
 def _excess(x: float, y: float, z: float, limits: Float64) -> float:
     """Return the amount by which three angles are outside limits (3, 2), 0 inside."""
-    return (
-        max(0.0, limits[0, 0] - x, x - limits[0, 1])
-        + max(0.0, limits[1, 0] - y, y - limits[1, 1])
-        + max(0.0, limits[2, 0] - z, z - limits[2, 1])
-    )
+    excess: float = max(0.0, limits[0, 0] - x, x - limits[0, 1])
+    excess += max(0.0, limits[1, 0] - y, y - limits[1, 1])
+    excess += max(0.0, limits[2, 0] - z, z - limits[2, 1])
+    return excess
 
 
 class Scratch(NamedTuple):
