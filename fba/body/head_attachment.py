@@ -109,12 +109,10 @@ class AttachedHead:
         returned. local_normals: float32 (V, 3), normals of the face in its own frame; normals: filled with
         those on the body. method: see `BodyModel.skin`. ValueError for arrays of other shapes.
         """
-        from fba.body.skin._loops import scale_and_shift
-
         if local.shape != self.skinner.vertices.shape:
             raise ValueError(f"vertices must have shape {self.skinner.vertices.shape}, not {local.shape}")
-        placed = np.empty(local.shape, dtype=np.float32)
-        scale_and_shift(local, self.size, self.shift, placed)
+        placed = local * np.float32(self.size)
+        placed += self.shift
         return self.skinner.skin_vertices(placed, local_normals, matrices, out, normals, method)
 
 

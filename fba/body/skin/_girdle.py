@@ -109,8 +109,8 @@ def turn_girdles(duals: Float32, girdle: Girdle) -> None:
         along = b * cx + c * cy + d * cz
         turned = 2.0 * np.arctan2(along if a >= 0.0 else -along, abs(a))
         angle = wanted - min(max(turned, 0.0), wanted)
-        _turn(duals, outer, angle, cx, cy, cz, centre)
-        _turn(duals, inner, 0.5 * angle, cx, cy, cz, centre)
+        for k in range(2):  # one call: each would be compiled by itself
+            _turn(duals, inner if k else outer, 0.5 * angle if k else angle, cx, cy, cz, centre)
 
 
 @inlined

@@ -150,8 +150,10 @@ def _twist_limbs(
 ) -> None:
     """Write to `twisted` vertices of limbs turned about their bones: see `fba.body.skin._skinning`."""
     for bone in range(len(twists.joint)):
-        own = twist(duals, parents, int(twists.joint[bone]), twists.axis[bone])
-        child = twist(duals, parents, int(twists.child[bone]), twists.child_axis[bone])
+        own, child = 0.0, 0.0
+        for k in range(2):  # one call: each would be compiled by itself
+            joint = twists.child[bone] if k else twists.joint[bone]
+            own, child = child, twist(duals, parents, joint, (twists.child_axis if k else twists.axis)[bone])
         axis, centre = twists.axis[bone], twists.centre[bone]
         ax, ay, az = axis[0], axis[1], axis[2]
         for k in range(twists.starts[bone], twists.starts[bone + 1]):
@@ -288,17 +290,6 @@ def _matrices(duals: Float32, rows: Float32) -> None:
         rows[j, 3] = factor * (w * b - x * a + y * d - z * c)
         rows[j, 7] = factor * (w * c - y * a + z * b - x * d)
         rows[j, 11] = factor * (w * d - z * a + x * c - y * b)
-
-
-@compiled
-def scale_and_shift(vertices: Float32, size: float, shift: Float32, out: Float32) -> None:
-    """Fill out (V, 3) with size x vertices + shift (3,)."""
-    factor = np.float32(size)
-    x, y, z = shift[0], shift[1], shift[2]
-    for i in range(len(vertices)):
-        out[i, 0] = factor * vertices[i, 0] + x
-        out[i, 1] = factor * vertices[i, 1] + y
-        out[i, 2] = factor * vertices[i, 2] + z
 
 
 @compiled

@@ -174,15 +174,16 @@ class BapSolver:
         tables = self._tables
         joints_solved = solver_loops.Joints(
             self.skeleton.parents,
-            solver_loops.Freedoms(tables.counts, tables.axis, tables.sign, tables.limits),
+            solver_loops.Freedoms(tables.counts * wanted, tables.axis, tables.sign, tables.limits),
             tables.bap,
             self.skeleton.centres[0],
             self.convention.translation,
             tables.metres,
         )
         before = self._angles(previous)
+        scratch = solver_loops.allocate_scratch(count, solver_loops.BLOCK_FRAMES)
         if not solver_loops.solve(
-            frames, joints_solved, wanted, before, previous is None, VALUE_LIMIT, values
+            frames, joints_solved, before, previous is None, VALUE_LIMIT, scratch, values
         ):
             raise ModelError("BapSolver.solve: the pose does not fit BAPs of 32 bits, in mm and 1e-5 rad")
         return values if array.ndim == 4 else values[0]

@@ -61,7 +61,4 @@ class Targets:
     def closest_angles(self, joint: str, local: Float64) -> Float64:
         """Return the angles (T, K) about a joint's axes closest to the rotations local (T, 3, 3)."""
         axes, numbers, signs = self.axes(joint)
-        angles = np.zeros((3, len(local)))
-        frames_last = np.ascontiguousarray(np.moveaxis(local, 0, -1))
-        joint_angles(frames_last, len(axes), numbers[None], signs[None], angles)
-        return angles[: len(axes)].T
+        return joint_angles(np.moveaxis(local, 0, -1), len(axes), numbers[None], signs[None]).T
