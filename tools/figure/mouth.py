@@ -22,6 +22,8 @@ UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
+SINKING = 0.0010
+"""Metres by which each lower tooth behind the canine is deeper than the one before it: the lip hides them."""
 AROUND = 12
 
 
@@ -39,6 +41,8 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
         width, height, thick = (float(row[name]) / 1000 for name in ("width", "height", "thick"))
         place, turn = _arch(along + width / 2, sign)
         tooth = _tooth(width, height, thick, float(row["flat"]), int(row["place"]), sign)
+        if not upper:
+            place[1] -= SINKING * max(int(row["place"]) - 3, 0)
         placed = _place_tooth(tooth, place, turn)
         meshes += [(mesh[0] + front, *mesh[1:]) for mesh in (placed, mirror(placed))]
         along += width + 0.00008
@@ -104,7 +108,7 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
     # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
-    shaded = (0.90, 0.88, 0.86) if sign > 0 else (0.84, 0.815, 0.79)
+    shaded = (0.90, 0.88, 0.86) if sign > 0 else (0.86, 0.80, 0.78)
     behind = np.array(shaded) ** (max(place - 2, 0) ** 1.15)
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * behind
     fissure = 1.0 if flat < 0.5 else 0.72
