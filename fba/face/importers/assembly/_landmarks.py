@@ -48,7 +48,7 @@ class Tuning:
     min_parted_share: float = 0.25  # lips part by at least this share of the jaw's motion
     max_half_mouth: float = 0.7  # width that half a mouth has at most, in distances of the eyes
     slit_step: float = 0.02  # width of a step along the line between the lips, in distances of the eyes
-    slit_end: float = 0.2  # lips still part at the corner by this share of their gap in the middle
+    slit_end: float = 0.1  # lips still part at the corner by this share of their gap in the middle
     min_loop_vertices: int = 6  # number of vertices that the opening of an eye has around it at least
     # distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils
     front_teeth: float = 0.12
@@ -361,7 +361,8 @@ def _end_of_slit(
         if not 0 < len(column) <= TUNING.max_in_column:
             continue
         between = np.linalg.norm(vertices[column][:, None] - vertices[column][None], axis=2)
-        parted = np.where(between < 0.04 * apart, drop[column][None] - drop[column][:, None], 0.0)
+        touching = np.maximum(1 - between / (0.04 * apart), 0.0)  # lips do, cheeks behind the corner do not
+        parted = touching * (drop[column][None] - drop[column][:, None])
         above = np.unravel_index(int(parted.argmax()), parted.shape)[0]
         first = max(first, float(parted.max()))
         if not first > TUNING.min_parted_share * float(drop.max()):
