@@ -90,7 +90,7 @@ FIGURES = (ALEX, RUTH)
 EYES = np.array([[0.0310, 0.0, -0.0123], [-0.0310, 0.0, -0.0123]])
 """About the centres of the eyeballs, in the finished head's frame: nothing moves there."""
 STILL, MOVING = 0.014, 0.022
-"""Metres from these up to which nothing moves, and from which on everything may."""
+"""Distances from these (m): up to the first nothing moves, beyond the second everything may."""
 
 
 def reshape(looks: Looks, positions: Float64) -> Float64:

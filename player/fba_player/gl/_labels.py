@@ -21,7 +21,7 @@ MAX_NAMES = 45
 NAME_GAP = 2.0
 """Pixels between a dot and its name."""
 NAME_ROWS = 4
-"""Names alone stand above each other, in so many rows, where they would overlap."""
+"""Largest number of rows of names one above another, where they would overlap."""
 
 
 def legend_picture(legend: Legend, scale: float) -> UInt8:
