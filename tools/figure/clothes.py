@@ -29,7 +29,7 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
-INSIDE = 2.2
+INSIDE = 1.7
 """Brightness of the inside of sleeves, hems and collar, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.932, 0.982
 TURN_UP = (0.066, 0.48)
@@ -205,7 +205,7 @@ def _make_garment(
         c, d = loop[:, 2:].T + count * row
         strips += [np.stack([b, a, c], axis=1), np.stack([b, c, d], axis=1)]
     faces = np.concatenate([cloth.triangles, *strips])
-    inner = np.arange(len(faces)) >= len(faces) - 2 * len(loop)
+    inner = np.arange(len(faces)) >= len(faces) - 4 * len(loop)
     # What is folded in moves with the cloth over it, or it would come out where that bends.
     over = cloth.weights[cKDTree(vertices).query(rows[-1], k=NEAREST)[1]].mean(axis=1)
     weights = np.concatenate([cloth.weights, *[cloth.weights[rim]] * len(ROUNDED), over])
