@@ -30,8 +30,7 @@ SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
 INSIDE, RIM = 1.7, 1.5
-"""Brightness of the inside of sleeves, hems and collar, and of their rims, relative to the cloth: little light gets
-there."""
+"""Brightness of the inside of clothes, and of their rims, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.932, 0.982
 TURN_UP = (0.066, 0.48)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
@@ -56,8 +55,10 @@ HEMMED, STITCHED = 0.0018, 0.0006
 ROUNDED = ((0.0012, -0.0003), (0.0021, -0.0014), (0.0020, -0.0028))
 """Rows that round an edge: metres beyond it, and outwards."""
 LEANING = (2.2, 1.7, 1.2, 0.5)
-"""Share of outwards to beyond in the normals of these rows and of what is folded in: cloth is too thin to be dark
-where it turns inwards, and a rim narrower than a pixel would flicker."""
+"""Shares of outwards to beyond in the normals of these rows and of what is folded in.
+
+Surfaces that face the limb would be nearly black, and a dark rim narrower than a pixel looks jagged.
+"""
 
 
 @dataclass(frozen=True, eq=False)

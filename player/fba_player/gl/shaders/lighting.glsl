@@ -129,6 +129,6 @@ float unshaded(vec3 before) {
     vec3 seen = textureLod(tops, before.xy + aside, 2.0).rgb + textureLod(tops, before.xy - aside, 2.0).rgb;
     vec2 mean = seen.yz / max(seen.x, 1e-3);
     float above = max(mean.x - before.z, 0.0), spread = max(mean.y - mean.x * mean.x, 2e-4);
-    return 0.25 + 0.75 * clamp((spread / (spread + above * above) - 0.2) * 1.25, 0.0, 1.0);
+    return 0.16 + 0.84 * clamp((spread / (spread + above * above) - 0.3) * 1.43, 0.0, 1.0);
 }
 #endif
