@@ -13,10 +13,12 @@ import numpy as np
 from cutting import MIDLINE, Cloth
 from person import Person
 from scipy.interpolate import PchipInterpolator
+from scipy.spatial import cKDTree
 
 from fba.arrays import Bool, Float64, Int64
 from fba.body import Skeleton
 from fba.mesh import vertex_normals
+from fba.rotations import unit
 from fba.sampling import smoothstep
 
 EdgeDistance = Callable[[Float64, Float64], Float64]
@@ -27,8 +29,8 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
-INSIDE = 2.2
-"""Brightness of the inside of sleeves, hems and collar, relative to the cloth: little light gets there."""
+INSIDE, RIM = 1.7, 1.5
+"""Brightness of the inside of clothes, and of their rims, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.932, 0.982
 TURN_UP = (0.066, 0.48)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
@@ -46,10 +48,17 @@ NECKLINE = (
 """Degrees from the front about the neck, and the height of the collar there."""
 FOLD, DEEP = 0.003, 0.022
 """Metres by which the inside of an edge reaches below the skin, and back under the cloth."""
+NEAREST = 4
+"""Vertices of the cloth from which what is folded in under them has its weights."""
 HEMMED, STITCHED = 0.0018, 0.0006
 """Metres by which cloth stands out where it is doubled along an edge, and by which stitches draw it in."""
 ROUNDED = ((0.0012, -0.0003), (0.0021, -0.0014), (0.0020, -0.0028))
 """Rows that round an edge: metres beyond it, and outwards."""
+LEANING = (2.2, 1.7, 1.2, 0.5)
+"""Shares of outwards to beyond in the normals of these rows and of what is folded in.
+
+Surfaces that face the limb would be nearly black, and a dark rim narrower than a pixel looks jagged.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +67,7 @@ class Garment:
 
     covered: depth of each vertex of the person under the garment, metres; negative where it is free.
     inside (V,): mask of vertices folded in at an edge, which is a crease. within (V,): metres from the edge.
+    facing (V, 3): normals along an edge; 0 elsewhere, where the surface has its own.
     places (V, 2): of vertices in `picture`, a JPEG file, 0..1 from its left and upper edge.
     """
 
@@ -68,6 +78,7 @@ class Garment:
     covered: Float64
     inside: Bool
     within: Float64
+    facing: Float64
     places: Float64 | None = None
     picture: bytes | None = None
 
@@ -111,8 +122,12 @@ def make_shirt(body: Body) -> Garment:
     # On an arm only the sleeve's plane counts: the hem's and the collar's would cut it, and it the trunk.
     kind = np.where(arms, 0, np.where(p[:, 1] > 1.25, 1, 2))
     loose = smoothstep((1.30 - p[:, 1]) / 0.25)
+    collar = ~arms * smoothstep(1 - depth_below_collar(p) / 0.05) * (p[:, 1] > 1.25)
     thick = (
-        0.0046 + 0.0075 * loose * ~arms + 0.0075 * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
+        0.0046
+        + 0.0075 * loose * ~arms
+        + 0.0026 * collar  # a bent neck must stay below it
+        + 0.0075 * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
     )
     return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.4 * loose, 14, SHIRT, 0.014)
 
@@ -193,17 +208,23 @@ def _make_garment(
         strips += [np.stack([b, a, c], axis=1), np.stack([b, c, d], axis=1)]
     faces = np.concatenate([cloth.triangles, *strips])
     inner = np.arange(len(faces)) >= len(faces) - 2 * len(loop)
-    weights = np.concatenate([cloth.weights, *[cloth.weights[rim]] * len(rows)])
+    # What is folded in moves with the cloth over it, or it would come out where that bends.
+    over = cloth.weights[cKDTree(vertices).query(rows[-1], k=NEAREST)[1]].mean(axis=1)
+    weights = np.concatenate([cloth.weights, *[cloth.weights[rim]] * len(ROUNDED), over])
     everything = np.concatenate([vertices, *rows])
+    facing = [unit(beyond + share * outward[rim]) for share in LEANING]
+    turned = np.concatenate([np.zeros_like(vertices), *facing])
     across = np.concatenate([cloth.values[:, 0], *[cloth.values[rim, 0]] * len(rows)])
     shade = np.where(inner, INSIDE, 1.0)
     side = np.concatenate([cloth.vertices[:, 0], *[cloth.vertices[rim, 0]] * len(rows)])
-    values = np.concatenate([weights, across[:, None]], axis=1)
+    values = np.concatenate([weights, across[:, None], turned], axis=1)
     everything, values, faces, shade = _mirror(everything, values, faces, shade, side)
     everything, values, faces, tone = _split_by_shade(everything, values, faces, shade)
-    weights, within = values[:, :-1], values[:, -1]
+    weights, within, facing = values[:, :-4], values[:, -4], values[:, -3:]
+    inside = tone == INSIDE
+    tone[facing.any(axis=1) & ~inside] = RIM
     colours = np.concatenate([tone[:, None] * colour, np.full((len(tone), 1), 0.06)], axis=1)
-    return Garment(everything, faces, colours, weights, value, tone == INSIDE, within)
+    return Garment(everything, faces, colours, weights, value, inside, within, facing)
 
 
 def _move_onto_edge(positions: Float64, level: float, edge_distance: Callable[[Float64], Float64]) -> Float64:
@@ -237,7 +258,7 @@ def _mirror(
 ) -> tuple[Float64, Float64, Int64, Float64]:
     """Return the left half and its mirror image. side (V,): x of the vertices before smoothing.
 
-    weights (V, J + N): of the joints, and values that are the same on both sides.
+    weights (V, J + N): of the joints, values that are the same on both sides, and a direction.
     """
     half = (side[faces] > -MIDLINE).all(axis=1)
     used, left = np.unique(faces[half], return_inverse=True)
@@ -246,6 +267,7 @@ def _mirror(
     positions, carried = vertices[used].copy(), weights[used].copy()
     other = carried.copy()
     other[:, : len(MIRROR)] = carried[:, MIRROR]
+    other[:, -3] *= -1.0
     positions[middle, 0] = 0.0
     carried[middle] = (carried[middle] + other[middle]) / 2
     number = np.arange(len(used))

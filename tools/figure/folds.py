@@ -333,6 +333,7 @@ def fold(
         weights=folded.weights[rows],
         inside=folded.inside[rows],
         within=folded.within[rows],
+        facing=folded.facing[rows],
         places=places.reshape(-1, 2)[first],
         picture=picture,
     )

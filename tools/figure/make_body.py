@@ -199,11 +199,12 @@ def complexion() -> Float64:
 
 
 def _welded_normals(garment: clothes.Garment) -> Float64:
-    """Return (V, 3) normals, smooth across coinciding vertices except at the creases of hems."""
+    """Return (V, 3) normals, smooth across coinciding vertices except at the creases of hems; edges' own."""
     keys = np.concatenate([np.round(garment.vertices, 7), garment.inside[:, None]], axis=1)
     _, first, same = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     normals = vertex_normals(garment.vertices[first], same.ravel()[garment.triangles])
-    return normals[same.ravel()].astype(np.float64)
+    own = garment.facing.any(axis=1, keepdims=True)
+    return np.where(own, garment.facing, normals[same.ravel()])
 
 
 def model() -> BodyModel:

@@ -48,6 +48,7 @@ def make_shoes(body: Float64, weights: Float64) -> Garment:
         np.where(body[:, 1] < TOP_HEIGHT + 0.01, COVERED_HEIGHT - body[:, 1], -1.0),
         np.zeros(2 * len(vertices), dtype=bool),
         np.ones(2 * len(vertices)),
+        np.zeros((2 * len(vertices), 3)),
         np.concatenate([places, places]),
         _paint(marks, triangles, places),
     )
