@@ -37,13 +37,13 @@ from fba.sampling import smoothstep
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
-TEETH = np.array([0.0, -0.0736, 0.0829])
+TEETH = np.array([0.0, -0.0728, 0.0829])
 """Point at which the edges of the middle incisors meet."""
 BEHIND = 0.012
 """Metres from there to the middle of the lips."""
 ABOVE = 0.0005
 """Metres from the top of the hair up to its feature point."""
-TONGUE = TEETH + np.array([0.0, -0.0006, -0.0032])
+TONGUE = TEETH + np.array([0.0, -0.0004, -0.0019])
 
 
 def make_skin() -> tuple[Refined, sculpt.Marks]:

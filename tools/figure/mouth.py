@@ -22,8 +22,8 @@ UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
-SINKING = np.array([0.0, 0.0, 0.0, 1.0, 2.6, 4.9, 7.4]) / 1000
-"""Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides those behind."""
+SINKING = np.array([0.0, 0.0, 0.0, 1.0, 2.7, 5.5, 8.4]) / 1000
+"""Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides them."""
 SUNK_GUM = 0.4
 """Share of that by which their gum is deeper: so low a crown is short, too."""
 AROUND = 12
@@ -180,9 +180,9 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     """Return the mesh of a tongue lying flat, and vertices of its feature points. tip: (3,), at the teeth."""
     # Down the tongue from its root to its tip, mm: z, top, half width, height.
     spine = np.array([
-        (-65, -34, 15, 24), (-61.5, -16, 16, 24), (-56, -7, 17, 20), (-48, -2.6, 17.3, 17.5),
-        (-38, -0.9, 17.2, 15.5), (-28, -0.2, 16.8, 13), (-19, 0.3, 15.3, 10.3), (-11, 0.7, 12.6, 7.6),
-        (-5, 0.8, 9.3, 5.2), (-2, 0.5, 6.6, 3.6), (-0.5, 0.25, 4.0, 2.2),
+        (-65, -34, 15, 24), (-61.5, -16, 16, 24), (-56, -7.4, 17, 20), (-48, -3.1, 17.3, 17.5),
+        (-38, -1.4, 17.2, 15.5), (-28, -0.7, 16.8, 13), (-19, -0.1, 15.3, 10.2), (-10.5, 0.4, 12.6, 7.4),
+        (-4.4, 0.6, 9.3, 5.0), (-1.6, 0.45, 6.6, 3.6), (-0.4, 0.25, 4.0, 2.2),
     ])  # fmt: skip
     from scipy.interpolate import PchipInterpolator
 

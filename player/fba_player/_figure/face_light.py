@@ -40,8 +40,8 @@ CLOSING_SKY = 0.45
 ENCLOSED = 0.04
 """Vertices near the mouth that see less of the sky than this while it is shut may be inside."""
 INSIDE_KEY, INSIDE_SKY, TONGUE_SKY = 0.44, 0.46, 0.08
-"""Shares of key light and sky that reach the inside of an open mouth by reflection; what falls on a tongue comes
-from red walls, and mirrors little of the sky."""
+"""Shares of key light and sky that reach the inside of an open mouth by reflection; a tongue, lit by red
+walls, mirrors little of the sky."""
 CONSTANT_HARMONIC = 0.282095
 """The first spherical harmonic, equal in all directions."""
 TURN_DECIMALS = 2
