@@ -14,8 +14,8 @@ ENAMEL = np.array([0.93, 0.88, 0.77])
 """Linear light."""
 NECK = np.array([0.86, 0.76, 0.58])
 GUM = np.array([0.60, 0.225, 0.20])
-TONGUE = np.array([0.58, 0.125, 0.100])
-TONGUE_UNDER = np.array([0.36, 0.075, 0.065])
+TONGUE = np.array([0.58, 0.155, 0.135])
+TONGUE_UNDER = np.array([0.46, 0.120, 0.110])
 HALF_WIDTH, DEPTH = 0.0285, 0.0420
 """Half axes of the outer edge of the upper arch of teeth, half an oval, metres."""
 UPPER_POWER, LOWER_POWER = 2.55, 2.1
