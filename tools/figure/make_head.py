@@ -43,7 +43,7 @@ BEHIND = 0.012
 """Metres from there to the middle of the lips."""
 ABOVE = 0.0005
 """Metres from the top of the hair up to its feature point."""
-TONGUE = TEETH + np.array([0.0, 0.0002, -0.0022])
+TONGUE = TEETH + np.array([0.0, -0.0004, -0.0019])
 
 
 def make_skin() -> tuple[Refined, sculpt.Marks]:
@@ -196,8 +196,11 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped) + 0.04 * cropped
     inside = near & (ring < 0)
-    depth = np.maximum(smoothstep((0.002 - z) / 0.060), 0.3 * smoothstep((-ring - 0.5) / 3.5)) * inside
-    colours[:, :3] *= 1 - depth[:, None] * (0.48, 0.60, 0.60)
+    # The throat is darker than the cheeks.
+    cheek = smoothstep((np.abs(surface.vertices[:, 0]) - 0.012) / 0.018)
+    depth = smoothstep((0.002 - z) / 0.060) * (1 - 0.5 * cheek)
+    depth = np.maximum(depth, 0.3 * smoothstep((-ring - 0.5) / 3.5)) * inside
+    colours[:, :3] *= 1 - depth[:, None] * (0.62, 0.74, 0.74)
     colours[:, 3] *= np.where(
         near, 0.1 + 0.9 * smoothstep(ring / sculpt.CONTACT_RING), 1.0
     )  # no sky in there

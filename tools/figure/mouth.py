@@ -14,16 +14,18 @@ ENAMEL = np.array([0.93, 0.88, 0.77])
 """Linear light."""
 NECK = np.array([0.86, 0.76, 0.58])
 GUM = np.array([0.60, 0.225, 0.20])
-TONGUE = np.array([0.60, 0.195, 0.18])
-TONGUE_UNDER = np.array([0.44, 0.13, 0.125])
+TONGUE = np.array([0.58, 0.155, 0.135])
+TONGUE_UNDER = np.array([0.46, 0.120, 0.110])
 HALF_WIDTH, DEPTH = 0.0285, 0.0420
 """Half axes of the outer edge of the upper arch of teeth, half an oval, metres."""
 UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
-SINKING = 0.0010
-"""Metres by which each lower tooth behind the canine is deeper than the one before it: the lip hides them."""
+SINKING = np.array([0.0, 0.0, 0.0, 1.0, 2.7, 5.5, 8.4]) / 1000
+"""Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides them."""
+SUNK_GUM = 0.4
+"""Share of that by which their gum is deeper: so low a crown is short, too."""
 AROUND = 12
 
 
@@ -40,9 +42,10 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
     for row in rows:
         width, height, thick = (float(row[name]) / 1000 for name in ("width", "height", "thick"))
         place, turn = _arch(along + width / 2, sign)
+        sunk = 0.0 if upper else SINKING[int(row["place"]) - 1]
+        height -= (1 - SUNK_GUM) * sunk
         tooth = _tooth(width, height, thick, float(row["flat"]), int(row["place"]), sign)
-        if not upper:
-            place[1] -= SINKING * max(int(row["place"]) - 3, 0)
+        place[1] -= sunk
         placed = _place_tooth(tooth, place, turn)
         meshes += [(mesh[0] + front, *mesh[1:]) for mesh in (placed, mirror(placed))]
         along += width + 0.00008
@@ -145,6 +148,8 @@ def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
         tooth = min(int(np.searchsorted(ends, length, side="right")) - 1, len(widths) - 1)
         across = (length - ends[tooth]) / widths[tooth] * 2 - 1
         low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
+    middles = (ends[:-1] + ends[1:]) / 2
+    sunk = np.interp(half, middles, SINKING * SUNK_GUM) if sign < 0 else np.zeros(len(half))
     positions = [_arch(length, sign) for length in half]
     # Out of the arch (mm), above the scallop (mm): the lower gum stays within the lip's inner side.
     under = ((0.7, 5.5), (-2.0, 9.5)) if sign > 0 else ((-1.2, 4.5), (-5.0, 9.5))
@@ -154,7 +159,8 @@ def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
         outward = np.array([np.sin(turn), 0.0, np.cos(turn)])
         for row, (out, up) in enumerate(profile):
             reach = out / 1000 if out > -4 else out / 1000 * (1 + 0.15 * k / len(half))
-            band[row, k] = place + outward * reach + np.array([0, sign * (low[k] + up / 1000), 0])
+            away = low[k] + up / 1000 + sunk[k] * (1 - up / 9.5)
+            band[row, k] = place + outward * reach + np.array([0, sign * away, 0])
     mirrored = band[:, :0:-1] * (-1.0, 1.0, 1.0)
     band = np.concatenate([mirrored, band], axis=1)
     columns = band.shape[1]
@@ -174,9 +180,9 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     """Return the mesh of a tongue lying flat, and vertices of its feature points. tip: (3,), at the teeth."""
     # Down the tongue from its root to its tip, mm: z, top, half width, height.
     spine = np.array([
-        (-65, -34, 15, 24), (-61.5, -14, 17, 26), (-56, -4.5, 17.5, 24), (-48, 0.5, 17.5, 22),
-        (-38, 2.0, 17.5, 19.5), (-28, 2.2, 17, 16), (-19, 1.9, 15.4, 12.5), (-11, 1.4, 12.6, 8.6),
-        (-5, 0.9, 9.2, 5.4), (-2, 0.5, 6.6, 3.6), (-0.5, 0.25, 4.0, 2.2),
+        (-65, -34, 15, 24), (-61.5, -16, 16, 24), (-56, -7.4, 17, 20), (-48, -3.1, 17.3, 17.5),
+        (-38, -1.4, 17.2, 15.5), (-28, -0.7, 16.8, 13), (-19, -0.1, 15.3, 10.2), (-10.5, 0.4, 12.6, 7.4),
+        (-4.4, 0.6, 9.3, 5.0), (-1.6, 0.45, 6.6, 3.6), (-0.4, 0.25, 4.0, 2.2),
     ])  # fmt: skip
     from scipy.interpolate import PchipInterpolator
 
@@ -185,7 +191,7 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     knots = np.linspace(0, 1, len(spine))
     z, top, half, tall = PchipInterpolator(knots, spine / 1000)(t).T
     turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
-    cx, cy = _rounded_square(turn, 2.6)
+    cx, cy = _rounded_square(turn, 2.2)
     vertices = np.zeros((rings, around, 3))
     vertices[..., 0] = half[:, None] * cx
     vertices[..., 1] = top[:, None] + tall[:, None] * (cy - 1) / 2
@@ -207,7 +213,7 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     under = np.clip(0.5 - cy, 0, 1)[None, :, None]
     colours = TONGUE * (1 - under) + TONGUE_UNDER * under
     # Darker, and redder, towards the throat; pale papillae on its back, and a dark groove along its middle.
-    colours = colours * (0.30 + 0.70 * t[:, None, None] ** (1.2, 1.4, 1.4))
+    colours = colours * (0.30 + 0.70 * t[:, None, None] ** (1.1, 1.6, 1.7))
     middle = np.exp(-((cx / 0.16) ** 2)) * (cy > 0.3)
     colours = colours * (1 - 0.30 * (middle * np.clip((1 - t[:, None]) * 8, 0, 1)))[..., None]
     random = np.random.default_rng(5)
@@ -217,5 +223,5 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     upward = around // 4
     side = int(np.abs(t - 0.64).argmin()) * around
     points = {"6.1": point, "6.2": body * around + upward, "6.3": side, "6.4": side + around // 2}
-    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.45)])
+    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.12)])
     return mesh, points

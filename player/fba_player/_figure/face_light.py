@@ -39,8 +39,9 @@ CLOSING_SKY = 0.45
 """Least share of the sky's light along lips and lids, where they touch."""
 ENCLOSED = 0.04
 """Vertices near the mouth that see less of the sky than this while it is shut may be inside."""
-INSIDE_KEY, INSIDE_SKY = 0.38, 0.46
-"""Shares of key light and sky that reach the inside of an open mouth by reflection."""
+INSIDE_KEY, INSIDE_SKY, TONGUE_SKY = 0.44, 0.46, 0.08
+"""Shares of key light and sky that reach the inside of an open mouth by reflection; a tongue, lit by red
+walls, mirrors little of the sky."""
 CONSTANT_HARMONIC = 0.282095
 """The first spherical harmonic, equal in all directions."""
 TURN_DECIMALS = 2
@@ -202,7 +203,10 @@ class FaceLight:
         for rows in self._tongues:
             inside[rows] = True
         near |= inside
-        wide = _lit_inside(cached_visibility(moved, normals, triangles, near), inside)
+        sky = np.where(inside, INSIDE_SKY, 0.0)
+        for rows in self._tongues:
+            sky[rows] = TONGUE_SKY
+        wide = _lit_inside(cached_visibility(moved, normals, triangles, near), sky)
         arrays = [
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
             for before, after in zip(shut, wide, strict=True)
@@ -254,12 +258,14 @@ def _largest_piece(triangles: Int32, chosen: Bool, near: Bool) -> Bool:
     return chosen & (piece == most.argmax()) if most.any() else np.zeros_like(chosen)
 
 
-def _lit_inside(wide: Visibility, enclosed: Bool) -> Visibility:
-    """Return visibility with the light that walls of the mouth cast on each other. enclosed: bool (V,)."""
-    light, open_ = wide.light.copy(), wide.open.copy()
-    light[enclosed, 0] += INSIDE_KEY / CONSTANT_HARMONIC
-    open_[enclosed] += INSIDE_SKY * (1 - open_[enclosed])
-    return wide._replace(light=light, open=open_)
+def _lit_inside(wide: Visibility, sky: Float64) -> Visibility:
+    """Return visibility with the light that walls of the mouth cast on each other.
+
+    sky: (V,), share of it that they reflect; 0 outside the mouth.
+    """
+    light = wide.light.copy()
+    light[sky > 0, 0] += INSIDE_KEY / CONSTANT_HARMONIC
+    return wide._replace(light=light, open=(wide.open + sky * (1 - wide.open)).astype(np.float32))
 
 
 def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
