@@ -233,12 +233,12 @@ class FaceFigure:
         """Return the slice of a part's vertices in the arrays of the model; KeyError for an unknown name."""
         return part_rows(self.model, name)
 
-    def shade(self, faps: Float32, frame: Float64) -> Float32:
+    def shade(self, faps: Float32, frame: Float64, light: FaceLight | None = None) -> Float32:
         """Return float32 (V, 4), the light that reaches the model's vertices, as in `FaceMesh.light`.
 
-        frame: (4, 4), the turned head's frame into the world.
+        frame: (4, 4), the turned head's frame into the world. light: that on some of the vertices; None: all.
         """
-        return self.light.shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
+        return (light or self.light).shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
 
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
         """Return the eyeballs for FAPs (68,); matrix: (4, 4), into the world.
