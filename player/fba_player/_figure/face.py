@@ -29,7 +29,7 @@ from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
 from fba_player.view._camera import Subject
 from fba_player.view._geometry import rotation_vector, transform
-from fba_player.view._view import Eye, FaceMesh, FaceShape
+from fba_player.view._view import IRIS, Eye, FaceMesh, FaceShape
 
 MAX_ROUNDNESS_ERROR = 0.03
 """A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""
@@ -123,7 +123,7 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     lids = tuple(int(model.bound[point_rows()[name]]) for name in LID_POINTS[side])
     meshes = [mesh for table in model.tables for mesh in table.meshes if mesh.part == part.name]
     bent = any(np.isin(rows, mesh.vertices).any() for mesh in meshes)
-    tint = _iris_tint(part, centre, unit * 512) or Eye.tint
+    tint = _iris_tint(part, centre, unit * 512) or IRIS
     iris = unit * 1024
     return Eyeball(side, centre, radius, rows, vertices[rows], bent, lids, iris, iris / 3, unit, tint)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple, cast
@@ -38,6 +38,8 @@ REACH_MARGIN = 1.1
 """How much further from joints vertices may get than they are as modelled."""
 NEARER = 1.5
 """A face's levels of detail are at hand up to so many times nearer: they change gradually."""
+MOST_MOVERS = 8
+"""How many choices of vertices are kept, a few megabytes each."""
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
@@ -136,6 +138,8 @@ class Person:
             pixel = seen.pixel * max(float(apart) - self._reach, 0.0)
             levels = tuple(choose_level(s, pixel / NEARER if s.levels else pixel) for s in shapes)
         if levels not in self._movers:
+            if len(self._movers) > MOST_MOVERS:
+                self._movers.clear()
             self._movers[levels] = self._make_movers(levels)
         return self._movers[levels]
 
@@ -143,12 +147,12 @@ class Person:
         head, light = self.head, self.figure.light
         if not any(levels):
             return Movers(self.body.skinner, head, light, 0)
-        numbers = iter(levels)
-        body = _needed(self.body_shapes, numbers, self.body)
-        face = _needed(self.face_shapes, numbers, self.figure.model)
+        of_face = levels[len(self.body_shapes) :]
+        body = _needed(self.body_shapes, levels[: len(self.body_shapes)], self.body)
+        face = _needed(self.face_shapes, of_face, self.figure.model)
         if head is not None:
             head, light = replace(head, skinner=head.skinner.restrict(face)), light.restrict(face)
-        faces = zip(levels[len(self.body_shapes) :], self.face_shapes.values(), strict=True)
+        faces = zip(of_face, self.face_shapes.values(), strict=True)
         finest = max((level for level, shape in faces if shape.levels), default=0)
         return Movers(self.body.skinner.restrict(body), head, light, finest)
 
@@ -249,10 +253,10 @@ def body_shape(part: BodyPart, joints: int, stored: dict[str, Any]) -> FaceShape
     )  # fmt: skip
 
 
-def _needed(shapes: Mapping[str, FaceShape], levels: Iterator[int], model: FaceModel | BodyModel) -> Intp:
+def _needed(shapes: Mapping[str, FaceShape], levels: tuple[int, ...], model: FaceModel | BodyModel) -> Intp:
     """Return the numbers (N,) of a model's vertices that its shapes need from these levels of detail on."""
     needed = np.zeros(len(model.vertices), dtype=bool)
-    for (name, shape), level in zip(shapes.items(), levels, strict=False):
+    for (name, shape), level in zip(shapes.items(), levels, strict=True):
         needed[part_rows(model, name)] = needed_vertices(shape, level)
     return np.flatnonzero(needed)
 

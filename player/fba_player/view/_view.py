@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 Colour = tuple[float, float, float, float]
 """Of annotations: red, green, blue as displayed (sRGB, 0..1), and opacity."""
 
+IRIS = (0.075, 0.105, 0.10)
+"""Colour of an iris of which none is known, linear light."""
 MOST_LIMBS = 12
 """Most limbs that keep the sky from a part; as in shaders/face.vert."""
 CAPSULE_FLOATS = 16
@@ -200,7 +202,7 @@ class Eye(NamedTuple):
     pupil: float
     lids: Float64
     axes: Float64
-    tint: tuple[float, float, float] = (0.075, 0.105, 0.10)
+    tint: tuple[float, float, float] = IRIS
 
 
 @dataclass(frozen=True, eq=False)
