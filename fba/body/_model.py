@@ -21,7 +21,7 @@ from fba.mesh import Material, Meshes, join_rows, mesh_arrays
 
 if TYPE_CHECKING:
     from fba.body.own_head import OwnHead
-    from fba.body.skin._skinning import Skinner
+    from fba.body.skin.skinning import Skinner
 
 __all__ = ["BODY_PART_KINDS", "BodyModel", "BodyPart", "Material"]
 
@@ -177,7 +177,7 @@ class BodyModel(Meshes[BodyPart]):
     @cached_property
     def skinner(self) -> Skinner:
         """The `Skinner` that `skin` uses; made on first use."""
-        from fba.body.skin._skinning import build_skinner
+        from fba.body.skin.skinning import build_skinner
 
         return build_skinner(
             self.vertices, self.normals, self.joints, self.weights, self.bind, self.skeleton, self.triangles

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from fba.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from fba.body._model import BodyModel, BodyPart
-from fba.body.skin._skinning import Skinner, build_skinner
 from fba.body.skin.skin_weights import INFLUENCES, checked_weights, strongest_weights
+from fba.body.skin.skinning import Skinner, build_skinner
 from fba.cache import load_or_make, make_key
 from fba.choices import SkinMethod
 from fba.errors import ModelError

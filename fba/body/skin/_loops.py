@@ -20,7 +20,7 @@ from fba.compiled import compiled, inlined
 
 
 class Twisting(NamedTuple):
-    """Vertices that are turned about B bones before skinning: see `fba.body.skin._skinning`."""
+    """Vertices that are turned about B bones before skinning: see `fba.body.skin.skinning`."""
 
     rows: Int64
     shares: Float64
@@ -42,7 +42,7 @@ class Skin(NamedTuple):
 
     vertices, normals: float32 (V, 3), as modelled. joints, weights: (V, 4), those with a weight first; counts
     (V,): how many those are. neighbours, coefficients: see `normal_rings`. inverse: float64 (J, 4, 4), of
-    the bind matrices. scratch: float32 (J, 12).
+    the bind matrices. scratch: float32 (J, 12). rows: int64 (N,), the vertices to be moved, all or fewer.
     """
 
     vertices: Float32
@@ -54,6 +54,7 @@ class Skin(NamedTuple):
     coefficients: Float32
     inverse: Float64
     scratch: Float32
+    rows: Int64
 
 
 class Limbs(NamedTuple):
@@ -86,8 +87,8 @@ def dual_frames(matrices: Float64, skin: Skin, limbs: Limbs, out: Float32, norma
         _skin_dual(twisted, skin, out[frame], frame_normals)
         straighten_armpits(twisted, skin.joints, skin.weights, skin.counts, scratch, limbs.girdle, out[frame])
         if normals.shape[0]:
-            _normals_from_neighbours(out[frame], skin.neighbours, skin.coefficients, frame_normals)
-        _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
+            _normals_from_neighbours(out[frame], skin, frame_normals)
+        _shift(out[frame], skin.rows, root[0, 3], root[1, 3], root[2, 3])
 
 
 @compiled
@@ -107,8 +108,8 @@ def linear_frames(matrices: Float64, skin: Skin, out: Float32, normals: Float32)
         frame_normals = normals[frame] if normals.shape[0] else out[frame][:0]
         _skin_linear(skin, out[frame], frame_normals)
         if normals.shape[0]:
-            _normals_from_neighbours(out[frame], skin.neighbours, skin.coefficients, frame_normals)
-        _shift(out[frame], root[0, 3], root[1, 3], root[2, 3])
+            _normals_from_neighbours(out[frame], skin, frame_normals)
+        _shift(out[frame], skin.rows, root[0, 3], root[1, 3], root[2, 3])
 
 
 @compiled
@@ -148,7 +149,7 @@ def joint_duals(matrices: Float64, inverse: Float64, parents: Int64, duals: Floa
 def _twist_limbs(
     vertices: Float32, parents: Int64, duals: Float32, twists: Twisting, twisted: Float32
 ) -> None:
-    """Write to `twisted` vertices of limbs turned about their bones: see `fba.body.skin._skinning`."""
+    """Write to `twisted` vertices of limbs turned about their bones: see `fba.body.skin.skinning`."""
     for bone in range(len(twists.joint)):
         own, child = 0.0, 0.0
         for k in range(2):  # one call: each would be compiled by itself
@@ -218,7 +219,7 @@ def _skin_dual(vertices: Float32, skin: Skin, out: Float32, normals: Float32) ->
     with_normals = normals.shape[0] > 0
     rows = np.empty((len(duals), 12), dtype=np.float32)
     _matrices(duals, rows)
-    for i in range(vertices.shape[0]):
+    for i in skin.rows:
         j = joints[i, 0]
         if counts[i] == 1:  # one joint, as for most of a head: nothing to blend
             px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
@@ -299,7 +300,7 @@ def _skin_linear(skin: Skin, out: Float32, normals: Float32) -> None:
     rest_normals, neighbours, rows = skin.normals, skin.neighbours, skin.scratch
     with_normals = normals.shape[0] > 0
     m = np.empty(12, dtype=np.float32)
-    for i in range(vertices.shape[0]):
+    for i in skin.rows:
         m[:] = 0
         for k in range(counts[i]):
             j, share = joints[i, k], weights[i, k]
@@ -322,11 +323,10 @@ def _skin_linear(skin: Skin, out: Float32, normals: Float32) -> None:
 
 
 @compiled
-def _normals_from_neighbours(
-    positions: Float32, neighbours: Int32, coefficients: Float32, normals: Float32
-) -> None:
+def _normals_from_neighbours(positions: Float32, skin: Skin, normals: Float32) -> None:
     """Fill normals from the positions of neighbours: see `normal_rings`."""
-    for i in range(positions.shape[0]):
+    neighbours, coefficients = skin.neighbours, skin.coefficients
+    for i in skin.rows:
         a, b, c, d = neighbours[i, 0], neighbours[i, 1], neighbours[i, 2], neighbours[i, 3]
         if a < 0:
             continue
@@ -352,9 +352,9 @@ def _normals_from_neighbours(
 
 
 @compiled
-def _shift(positions: Float32, x: float, y: float, z: float) -> None:
+def _shift(positions: Float32, rows: Int64, x: float, y: float, z: float) -> None:
     """Shift positions to the world, in place; done last, so that large offsets cost no precision."""
-    for i in range(positions.shape[0]):
+    for i in rows:
         positions[i, 0] += x
         positions[i, 1] += y
         positions[i, 2] += z

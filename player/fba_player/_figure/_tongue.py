@@ -68,19 +68,19 @@ class Tongue:
         if share == 0.0:
             return
         before = positions[self.rows].astype(np.float64)
-        room = self._room(positions.astype(np.float64))
+        room = self._room(positions)
         moved = room.stop(before)
         moved = self._level(moved, room)
         moved = room.clamp(moved)
         positions[self.rows] = before + share * (moved - before)
         normals[self.rows] = vertex_normals(positions[self.rows], self.triangles)
 
-    def _room(self, positions: Float64) -> Room:
-        upper, lower, left, right = positions[self.lips]
+    def _room(self, positions: Float32) -> Room:
+        upper, lower, left, right = positions[self.lips].astype(np.float64)
         return Room(
             (upper, lower, (left + right) / 2),
             max(abs(float(left[0] - right[0])) / 2, 1e-6),
-            tuple(positions[self.teeth]),
+            tuple(positions[self.teeth].astype(np.float64)),
             float(positions[self.front, 2]),
             self.size,
         )

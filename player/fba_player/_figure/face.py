@@ -29,7 +29,7 @@ from fba_player._figure.model_units import EYES_APART
 from fba_player._figure.wrinkles import place_wrinkles, wrinkle_strengths
 from fba_player.view._camera import Subject
 from fba_player.view._geometry import rotation_vector, transform
-from fba_player.view._view import Eye, FaceMesh, FaceShape
+from fba_player.view._view import IRIS, Eye, FaceMesh, FaceShape
 
 MAX_ROUNDNESS_ERROR = 0.03
 """A part whose median distance from its sphere exceeds this share of the radius is drawn as a mesh."""
@@ -123,7 +123,7 @@ def find_eyeball(part: Part, model: FaceModel) -> Eyeball | None:
     lids = tuple(int(model.bound[point_rows()[name]]) for name in LID_POINTS[side])
     meshes = [mesh for table in model.tables for mesh in table.meshes if mesh.part == part.name]
     bent = any(np.isin(rows, mesh.vertices).any() for mesh in meshes)
-    tint = _iris_tint(part, centre, unit * 512) or Eye.tint
+    tint = _iris_tint(part, centre, unit * 512) or IRIS
     iris = unit * 1024
     return Eyeball(side, centre, radius, rows, vertices[rows], bent, lids, iris, iris / 3, unit, tint)
 
@@ -233,12 +233,12 @@ class FaceFigure:
         """Return the slice of a part's vertices in the arrays of the model; KeyError for an unknown name."""
         return part_rows(self.model, name)
 
-    def shade(self, faps: Float32, frame: Float64) -> Float32:
+    def shade(self, faps: Float32, frame: Float64, light: FaceLight | None = None) -> Float32:
         """Return float32 (V, 4), the light that reaches the model's vertices, as in `FaceMesh.light`.
 
-        frame: (4, 4), the turned head's frame into the world.
+        frame: (4, 4), the turned head's frame into the world. light: that on some of the vertices; None: all.
         """
-        return self.light.shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
+        return (light or self.light).shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
 
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
         """Return the eyeballs for FAPs (68,); matrix: (4, 4), into the world.

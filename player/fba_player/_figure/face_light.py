@@ -98,6 +98,7 @@ class FaceLight:
         self._deformer = deformer
         self._sway = sway
         self._last: tuple[tuple[object, ...], Float32] | None = None
+        self._rows: Intp | None = None
         lips = [int(model.bound[point_rows()[name]]) for name in ("2.2", "2.3")]
         self._lips = lips if min(lips) >= 0 else None
         self._tongues, self._teeth = (
@@ -108,6 +109,12 @@ class FaceLight:
     def lips(self) -> Sequence[int]:
         """The two vertices of the lips whose distance says how far the mouth is open; none in some models."""
         return self._lips or ()
+
+    def restrict(self, rows: Intp) -> FaceLight:
+        """Return what lights only these vertices (N,): other rows of its results have no meaning."""
+        light = FaceLight(self._model, self._deformer, self._sway)
+        light.baked, light._rows = self.baked, rows
+        return light
 
     def shade(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
         """Return float32 (V, 4), 0..1: the share of light that reaches each vertex, as in `FaceMesh.light`.
@@ -133,6 +140,9 @@ class FaceLight:
         """
         (shut, bent, wide), near, partly = self._tables
         light = _reaching(shut, lights[0])
+        if self._rows is not None:
+            some, light = light, np.zeros((len(self._sway), 4), dtype=np.float32)
+            light[self._rows] = some
         if len(lights) > 1:
             still = _reaching(bent, lights[1])
             light[partly] = still + self._sway[partly, None] * (light[partly] - still)
@@ -151,9 +161,12 @@ class FaceLight:
     def _tables(self) -> tuple[tuple[Float32, Float32, Float32], Intp, Intp]:
         """Visibility with the mouth shut (33, V), the same (33, N) where vertices turn only partly with the
         head, and with it wide open (33, M) near it; vertices (M,) near the mouth, and those (N,)."""
-        near, partly = np.flatnonzero(self.baked.near), np.flatnonzero(self._sway < 1)
-        shut, wide = (_joined(seen).T.copy() for seen in (self.baked.shut, self.baked.wide))
-        return (shut, shut[:, partly], wide[:, near]), near, partly
+        lit = np.full(len(self._sway), self._rows is None)
+        if self._rows is not None:
+            lit[self._rows] = True
+        near, partly = np.flatnonzero(lit & self.baked.near), np.flatnonzero(lit & (self._sway < 1))
+        shut, wide = (_joined(seen) for seen in (self.baked.shut, self.baked.wide))
+        return (shut[lit].T.copy(), shut[partly].T.copy(), wide[near].T.copy()), near, partly
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, cast
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from fba.arrays import Bool, Float32, Float64
+from fba.arrays import Bool, Float32, Float64, Intp
 from fba.body import AttachedHead, BodyModel, BodyPart, attach_head
 from fba.body.head_attachment import skull_of
-from fba.face import Part
+from fba.body.skin.skinning import Skinner
+from fba.face import FaceModel, Part
 from fba.parameters import point_rows
 from fba_player._figure._face_parts import cast_coarsely, detail_levels, keep_triangles, make_shape, part_rows
 from fba_player._figure.baked_shapes import load_baked
 from fba_player._figure.body_light import BodyLight, build_body_light
+from fba_player._figure.detail import choose_level, needed_vertices
 from fba_player._figure.face import FaceFigure
+from fba_player._figure.face_light import FaceLight
 from fba_player._figure.wrinkles import wrinkle_strengths
-from fba_player.view._view import Eye, FaceMesh, FaceShape
+from fba_player.view._view import Eye, FaceMesh, FaceShape, Seen
 
 SCATTERING_KINDS = ("skin", "neck")
 """Kinds of a body's parts below whose surface light scatters."""
@@ -29,8 +34,26 @@ HEAD_SHARE = 0.3
 """A part of a body with its own head is drawn in full detail if more than this share of it is on the head."""
 WORLD = np.eye(4)
 NO_TURN = np.zeros(3)
+REACH_MARGIN = 1.1
+"""How much further from joints vertices may get than they are as modelled."""
+NEARER = 1.5
+"""A face's levels of detail are at hand up to so many times nearer: they change gradually."""
+MOST_MOVERS = 8
+"""How many choices of vertices are kept, a few megabytes each."""
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
+
+
+class Movers(NamedTuple):
+    """What moves and lights those vertices that levels of detail from some on are made of.
+
+    finest: the first level of the face.
+    """
+
+    body: Skinner
+    head: AttachedHead | None
+    light: FaceLight
+    finest: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +70,7 @@ class Person:
     body_shapes: dict[str, FaceShape]
     face_shapes: dict[str, FaceShape]
     light: BodyLight
+    _movers: dict[tuple[int, ...], Movers] = field(default_factory=dict, init=False)
 
     @property
     def headroom(self) -> float:
@@ -74,31 +98,70 @@ class Person:
         frame: Float64 = joints[skull] @ np.linalg.inv(self.body.bind[skull]) @ place
         return frame
 
-    def meshes(self, faps: Float32, joints: Float64) -> list[FaceMesh]:
-        """Return all parts but the eyeballs for FAPs (68,) and joint matrices as `joints` returns them."""
+    def meshes(self, faps: Float32, joints: Float64, seen: Seen | None = None) -> list[FaceMesh]:
+        """Return all parts but the eyeballs for FAPs (68,) and joint matrices as `joints` returns them.
+
+        seen: where from; then only those vertices are moved that levels of detail chosen there consist of.
+        """
+        movers = self._choose_movers(joints, seen)
         positions, normals = np.empty_like(self.body.vertices), np.empty_like(self.body.vertices)
         own_head = self.body.own_head if self.head is None else None
         if own_head is None:
-            self.body.skin(joints, positions, normals)
+            movers.body.skin(joints, positions, normals)
         else:
             moved = own_head.move(self.body.vertices, faps)
-            self.body.skinner.skin_vertices(moved, self.body.normals, joints, positions, normals)
+            movers.body.skin_vertices(moved, self.body.normals, joints, positions, normals)
         light, limbs = self.light.light, self.light.limbs(joints)
         meshes = [
             _mesh_in_world(shape, part_rows(self.body, name), positions, normals, light, limbs=limbs)
             for name, shape in self.body_shapes.items()
         ]
-        if self.head is None:
+        if movers.head is None:
             return meshes
         pose = self.figure.pose(faps)
         positions, normals = np.empty_like(pose.positions), np.empty_like(pose.positions)
-        self.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
-        light = self.figure.shade(faps, self.frame(joints))
+        movers.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
+        light = self.figure.shade(faps, self.frame(joints), movers.light)
         wrinkles = wrinkle_strengths(faps)
         for name, shape in self.face_shapes.items():
             rows = self.figure.rows(name)
-            meshes.append(_mesh_in_world(shape, rows, positions, normals, light, wrinkles=wrinkles))
+            more = {"wrinkles": wrinkles, "finest": movers.finest}
+            meshes.append(_mesh_in_world(shape, rows, positions, normals, light, **more))
         return meshes
+
+    def _choose_movers(self, joints: Float64, seen: Seen | None) -> Movers:
+        """Return what moves the vertices of all levels of detail that may be drawn from there."""
+        shapes = [*self.body_shapes.values(), *self.face_shapes.values()]
+        levels = (0,) * len(shapes)
+        if seen is not None:
+            apart = np.linalg.norm(joints[:, :3, 3] - seen.eye, axis=1).min()
+            pixel = seen.pixel * max(float(apart) - self._reach, 0.0)
+            levels = tuple(choose_level(s, pixel / NEARER if s.levels else pixel) for s in shapes)
+        if levels not in self._movers:
+            if len(self._movers) > MOST_MOVERS:
+                self._movers.clear()
+            self._movers[levels] = self._make_movers(levels)
+        return self._movers[levels]
+
+    def _make_movers(self, levels: tuple[int, ...]) -> Movers:
+        head, light = self.head, self.figure.light
+        if not any(levels):
+            return Movers(self.body.skinner, head, light, 0)
+        of_face = levels[len(self.body_shapes) :]
+        body = _needed(self.body_shapes, levels[: len(self.body_shapes)], self.body)
+        face = _needed(self.face_shapes, of_face, self.figure.model)
+        if head is not None:
+            head, light = replace(head, skinner=head.skinner.restrict(face)), light.restrict(face)
+        faces = zip(of_face, self.face_shapes.values(), strict=True)
+        finest = max((level for level, shape in faces if shape.levels), default=0)
+        return Movers(self.body.skinner.restrict(body), head, light, finest)
+
+    @cached_property
+    def _reach(self) -> float:
+        """The largest distance (m) of a vertex from the joint that carries it most."""
+        skinners = [self.body.skinner] if self.head is None else [self.body.skinner, self.head.skinner]
+        away = [s.vertices - self.body.bind[s.joints[:, 0], :3, 3] for s in skinners]
+        return REACH_MARGIN * max(float(np.linalg.norm(a, axis=1).max(initial=0.0)) for a in away)
 
     def eyes(self, faps: Float32, joints: Float64) -> list[Eye]:
         """Return the eyeballs for FAPs (68,) and joint matrices as `joints` returns them."""
@@ -188,6 +251,14 @@ def body_shape(part: BodyPart, joints: int, stored: dict[str, Any]) -> FaceShape
         shape, scatter=float(part.kind in SCATTERING_KINDS), two_sided=open_surface, closed=not open_surface,
         name="", coarser=detail_levels(part, carried.astype(np.float32), stored), casts=True,
     )  # fmt: skip
+
+
+def _needed(shapes: Mapping[str, FaceShape], levels: tuple[int, ...], model: FaceModel | BodyModel) -> Intp:
+    """Return the numbers (N,) of a model's vertices that its shapes need from these levels of detail on."""
+    needed = np.zeros(len(model.vertices), dtype=bool)
+    for (name, shape), level in zip(shapes.items(), levels, strict=True):
+        needed[part_rows(model, name)] = needed_vertices(shape, level)
+    return np.flatnonzero(needed)
 
 
 def _mesh_in_world(

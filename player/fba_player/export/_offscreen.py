@@ -73,7 +73,7 @@ class Offscreen(Closing):
     def draw(self, time: float) -> UInt8:
         """Return the picture at a time, as `frame` returns it, in memory that the next call overwrites."""
         camera = follow_camera(self.camera, self.scene, time, of_head=self._of_head)
-        return self._draw_view(self.scene.view_at(time), camera)
+        return self._draw_view(self.scene.view_at(time, camera.seen(self.size[1])), camera)
 
     def still(self, faps: npt.ArrayLike) -> UInt8:
         """Return a picture of the face for FAPs (68,) as `fba.face.resolve` returns them: uint8 (H, W, 4).

@@ -28,6 +28,8 @@ FRAMED = 0.25
 """Metres: in steps of these, the map that the key light sees is larger than what throws shadows."""
 WIDTH = 4.8
 """Metres of ground, along each side, for one body."""
+COARSE = 2.0
+"""Shadows are cast coarsely on ground that is more than so many times as wide."""
 ACROSS = unit(np.array([KEY_DIRECTION[2], 0.0, -KEY_DIRECTION[0]]))
 BEFORE = np.stack([ACROSS, np.cross(unit(np.array(KEY_DIRECTION)), ACROSS)], axis=1).astype(np.float32)
 """(3, 2): axes of the map that the key light sees, as in shaders/lighting.glsl."""
@@ -60,7 +62,7 @@ class GroundShadow:
         self._shaded = context.framebuffer([self._darkness])
         self._shapes = RecentlyUsed[tuple[Intp, Int32]](CACHED_SHAPES, lambda _: None)
         self._thrown_parts: list[Any] = []
-        self._thrown_shapes: list[FaceShape] = []
+        self._thrown_shapes: list[tuple[FaceShape, bool]] = []
         self._square = context.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4").tobytes())
         self._programs = {name: load_program(context, name) for name in ("thrown", "shaded", "cast")}
         self._arrays = {
@@ -102,7 +104,7 @@ class GroundShadow:
 
         gl = self._gl
         thrown, shaded = self._programs["thrown"], self._programs["shaded"]
-        frame = self._place(casting) if casting else (0.0, 0.0, 1.0)
+        frame = self._place(casting, width > COARSE * WIDTH) if casting else (0.0, 0.0, 1.0)
         for program in (thrown, shaded):
             for name, value in (("low", low), ("width", width), ("frame", frame)):
                 set_uniform(program, name, value)
@@ -127,14 +129,15 @@ class GroundShadow:
         self._arrays["shaded"].render(gl.TRIANGLE_STRIP)
         return frame
 
-    def _place(self, casting: list[FaceMesh]) -> tuple[float, float, float]:
+    def _place(self, casting: list[FaceMesh], coarsely: bool) -> tuple[float, float, float]:
         """Write the places of all vertices, and return the frame of the map that the key light sees.
 
+        coarsely: whether few triangles do, as each body covers little of the maps.
         All triangles are drawn at once: software OpenGL takes longer to begin a part than to draw it.
         """
-        shapes = [mesh.shape for mesh in casting]
-        parts = [self._shapes.get(shape, lambda shape=shape: _casting(shape)) for shape in shapes]  # type: ignore[misc]
-        if [*map(id, shapes)] != [*map(id, self._thrown_shapes)]:
+        shapes = [(mesh.shape, coarsely) for mesh in casting]
+        parts = [self._shapes.get(shape, lambda shape=shape: _casting(*shape)) for shape in shapes]  # type: ignore[misc]
+        if shapes != self._thrown_shapes:
             self._join(shapes, parts)
         places = [
             mesh.positions.take(rows, axis=0) @ mesh.matrix[:3, :3].T.astype(np.float32)
@@ -145,7 +148,7 @@ class GroundShadow:
         write_buffer(self._thrown_parts[1], points)
         return _frame_around(points)
 
-    def _join(self, shapes: list[FaceShape], parts: list[tuple[Intp, Int32]]) -> None:
+    def _join(self, shapes: list[tuple[FaceShape, bool]], parts: list[tuple[Intp, Int32]]) -> None:
         """Make the buffers for the casting vertices of all shapes, one after the other."""
         for part in self._thrown_parts:
             part.release()
@@ -165,9 +168,12 @@ class GroundShadow:
             part.release()
 
 
-def _casting(shape: FaceShape) -> tuple[Intp, Int32]:
+def _casting(shape: FaceShape, coarsely: bool) -> tuple[Intp, Int32]:
     """Return the vertices (N,) of the triangles that cast a shape's shadow, and these triangles of them."""
-    rows, corners = np.unique(shape.triangles if shape.outer is None else shape.outer, return_inverse=True)
+    triangles = shape.triangles if shape.outer is None else shape.outer
+    if coarsely and shape.outermost is not None:
+        triangles = shape.outermost
+    rows, corners = np.unique(triangles, return_inverse=True)
     return rows.astype(np.intp), corners.reshape(-1, 3).astype(np.int32)
 
 

@@ -6,7 +6,6 @@ Bounds: rows of a level are vertices of its full part (`place_on_full`), whose a
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -15,18 +14,15 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32, Intp
 from fba.compiled import compiled
-from fba.mesh.simplify import TOLERANCES
+from fba.mesh.simplify import TOLERANCES, DetailLevels
+from fba_player._figure.detail import choose_level, level_triangles, sampled
 from fba_player.view._view import FaceMesh, FaceShape
 
-MAX_ERROR_PIXELS = 1.3
-"""Largest error of a coarser mesh of a body, in pixels."""
-MAX_FACE_ERROR_PIXELS = 0.3
-"""Largest root-mean-square error of a face's level of detail, in pixels."""
+MAX_SHADOW_ERROR = TOLERANCES[-2]
+"""Largest error (m) of what casts the shadow of one body among several."""
 MORPH_SECONDS = 0.5
 """Seconds in which the vertices of a face move from one level of detail to another."""
 FULL = ("full", "0")
-SAMPLED_VERTICES = 24
-"""Number of vertices from which the distance to the camera is taken."""
 
 
 @dataclass(eq=False)
@@ -90,13 +86,13 @@ class Details:
         for face in _faces(meshes):
             parts = [meshes[number] for number in face]
             away = distance(max(parts, key=lambda mesh: len(mesh.positions)), position)
-            errors = [level.error for level in parts[0].shape.levels]
-            wanted = bisect_right(errors, MAX_FACE_ERROR_PIXELS * pixel * away)
-            if lod != "auto":
-                wanted = 0 if lod in FULL else min(int(lod), len(errors))
             first = parts[0].shape
+            wanted = choose_level(first, pixel * away)
+            if lod != "auto":
+                wanted = 0 if lod in FULL else min(int(lod), len(first.levels))
             count[first] = count.get(first, -1) + 1
             shown = self._shown.setdefault(first, {}).setdefault(count[first], _Shown(wanted, wanted))
+            shown.level, shown.goal = max(shown.level, parts[0].finest), max(shown.goal, parts[0].finest)
             share = shown.change(wanted, now)
             self.morphing |= shown.level != shown.goal
             for number, mesh in zip(face, parts, strict=True):
@@ -144,11 +140,10 @@ class Details:
         )
 
     def _choose(self, mesh: FaceMesh, eye: Float64, pixel: float) -> FaceMesh:
-        coarser = mesh.shape.coarser
-        if coarser is None or not len(mesh.positions):
+        if (mesh.shape.coarser is None and mesh.shape.across is None) or not len(mesh.positions):
             return mesh
         away = distance(mesh, eye)
-        level = self._level(mesh.shape, bisect_right(TOLERANCES, MAX_ERROR_PIXELS * pixel * away))
+        level = self._level(mesh.shape, choose_level(mesh.shape, pixel * away))
         if level is None:
             return mesh
         if level.light is None or not share_memory(level.light[0], mesh.light):
@@ -164,36 +159,48 @@ class Details:
     def _level(self, shape: FaceShape, number: int) -> _Level | None:
         levels = self._levels.setdefault(shape, {})
         if number not in levels:
-            assert shape.coarser is not None
-            triangles = shape.coarser.triangles_within(TOLERANCES[number - 1]) if number else None
+            triangles = level_triangles(shape, number)
             levels[number] = None if triangles is None else _make_level(shape, triangles)
         return levels[number]
 
 
 def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
     rows, corners = np.unique(triangles, return_inverse=True)
-    texcoords, places = (
+    texcoords, places, across = (
         None if array is None else np.ascontiguousarray(array[rows])
-        for array in (shape.texcoords, shape.wrinkle_places)
+        for array in (shape.texcoords, shape.wrinkle_places, shape.across)
     )
-    assert shape.coarser is not None
-    outer = shape.coarser.triangles_within(TOLERANCES[-1])  # for shadows on the ground
+    outer = None if shape.coarser is None else shape.coarser.triangles_within(TOLERANCES[-1])
+    outermost = None
     if outer is not None:
         number = np.full(len(shape.sway), -1, dtype=np.int32)
         number[rows] = np.arange(len(rows))
         outer = number[outer]
         outer = np.ascontiguousarray(outer) if outer.min(initial=0) >= 0 else None
+    if outer is not None and shape.coarser is not None:
+        outermost = _close_and_simplify(shape.coarser.points[rows, :3], outer)
     coarser = replace(
         shape,
         outer=outer,
+        outermost=outermost,
         triangles=np.ascontiguousarray(corners.reshape(-1, 3), dtype=np.int32),
         colours=np.ascontiguousarray(shape.colours[rows]),
         sway=np.ascontiguousarray(shape.sway[rows]),
         texcoords=texcoords,
         wrinkle_places=places,
+        across=across,
         coarser=None,
     )
     return _Level(coarser, rows.astype(np.intp))
+
+
+def _close_and_simplify(points: Float32, triangles: Int32) -> Int32:
+    """Return int32 (F, 3): fewer triangles, in which seams are closed; else all their vertices would stay."""
+    rows, corners = np.unique(triangles, return_inverse=True)
+    places, first, same = np.unique(points[rows], axis=0, return_index=True, return_inverse=True)
+    closed = same.ravel()[corners].reshape(-1, 3).astype(np.int32)
+    fewer = DetailLevels(places, 1, closed).triangles_within(MAX_SHADOW_ERROR)
+    return np.asarray(rows[first][closed if fewer is None else fewer], dtype=np.int32)
 
 
 def _faces(meshes: list[FaceMesh]) -> list[list[int]]:
@@ -230,7 +237,7 @@ def _add_means(values: Float32, rows: Int32, weights: Float32, means: Float32) -
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """Return the distance from an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
-    sample = mesh.positions[:: max(len(mesh.positions) // SAMPLED_VERTICES, 1)]
+    sample = mesh.positions[sampled(len(mesh.positions))]
     squared = float(mesh.matrix[:3, 0] @ mesh.matrix[:3, 0])  # of the scale
     if not squared > 0:
         return 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -121,7 +120,7 @@ class Renderer:
         aspect = size[0] / max(size[1], 1)
         seen = camera.view_matrix()
         matrix, eye = camera.projection_matrix(aspect) @ seen, -seen[:3, :3].T @ seen[:3, 3]
-        pixel = 2 * math.tan(math.radians(camera.field_of_view) / 2) / max(size[1], 1)
+        pixel = camera.seen(size[1]).pixel
 
         gl.viewport = (0, 0, *size)
         gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)

@@ -20,7 +20,7 @@ from fba_player.scene._photo_editing import VIEWS, PhotoEditing, Spot
 from fba_player.scene._placement_scene import CURRENT, MATE, PLACED, RADII, fit_box, make_dots, plain_mesh
 from fba_player.view._camera import Camera
 from fba_player.view._geometry import project, ray_through
-from fba_player.view._view import Colour, Dots, Extras, FaceMesh, FaceShape, View
+from fba_player.view._view import Colour, Dots, Extras, FaceMesh, FaceShape, Seen, View
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
 
@@ -46,7 +46,7 @@ class PhotoScene(Timed[Timeline]):
         self.title = editing.photographs[0].name
         self.has_body = False
 
-    def view_at(self, time: float) -> View:
+    def view_at(self, time: float, seen: Seen | None = None) -> View:
         """Return the photographs and their points; at any time the same."""
         if not math.isfinite(time):
             raise ValueError(f"a time must be finite, not {time}")

@@ -21,7 +21,7 @@ from fba_player.playback._timeline import Timeline
 from fba_player.scene._point_placement import MATES, PointPlacement
 from fba_player.view._camera import Camera, Subject
 from fba_player.view._geometry import first_hit, ray_through, transform
-from fba_player.view._view import Colour, Dots, Extras, FaceMesh, FaceShape, View
+from fba_player.view._view import Colour, Dots, Extras, FaceMesh, FaceShape, Seen, View
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
 
@@ -58,7 +58,7 @@ class PlacementScene(Timed[Timeline]):
         self.title = Path(placement.surface.path).name
         self.has_body = False
 
-    def view_at(self, time: float) -> View:
+    def view_at(self, time: float, seen: Seen | None = None) -> View:
         """Return the head and its points; at any time the same."""
         if not math.isfinite(time):
             raise ValueError(f"a time must be finite, not {time}")

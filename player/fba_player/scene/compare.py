@@ -20,7 +20,7 @@ from fba_player.scene._fap_heatmap import heat_legend
 from fba_player.scene._layout import Drawing, join_views, make_captions, move_view
 from fba_player.scene.scene import Scene
 from fba_player.view._camera import FACE_PRESETS, PRESETS, Camera, Subject
-from fba_player.view._view import Extras, View, Wipe
+from fba_player.view._view import Extras, Seen, View, Wipe
 from fba_player.view.protocols import Timed
 
 if TYPE_CHECKING:
@@ -193,14 +193,18 @@ class CompareScene(Timed[CompareTimeline]):
         """Return the displacement of the first scene's head from the start to a time, metres."""
         return self.scenes[0].head_travel(self.timeline.own_time(0, time))
 
-    def view_at(self, time: float) -> View:
-        """Return everything to be drawn at a time in seconds; ValueError if it is not finite."""
+    def view_at(self, time: float, seen: Seen | None = None) -> View:
+        """Return everything to be drawn at a time in seconds; see `Scene.view_at`."""
         times = [self.timeline.own_time(number, time) for number in range(len(self.scenes))]
         if self._arrangement == "over":
             return self._over(times)
         if self._arrangement == "wipe":
             return self._wiped(times)
-        views = list(self._threads.map(lambda scene, own: scene.view_at(own), self.scenes, times))
+        offsets = [self._placed(number, times) for number in range(len(self.scenes))]
+        alone: list[Seen | None] = [None] * len(offsets)
+        if seen is not None and self._arrangement == "side":
+            alone = [seen.move(offset) for offset in offsets]
+        views = list(self._threads.map(lambda scene, *at: scene.view_at(*at), self.scenes, times, alone))
         most = 0.0
         if self._arrangement == "colour" and len(views) > 1:
             most = self._most()
@@ -209,8 +213,7 @@ class CompareScene(Timed[CompareTimeline]):
                 offset = self._compared_at(number, times)
                 faces = self._colours.paint(faces, views[0].faces, offset, most)
                 views[number] = replace(views[number], faces=faces)
-        for number, view in enumerate(views):
-            views[number] = move_view(view, self._placed(number, times))
+        views = [move_view(view, offset) for view, offset in zip(views, offsets, strict=True)]
         joined = self._captioned(join_views(views), range(len(views)), times)
         if not most:
             return joined

@@ -18,7 +18,7 @@ from fba_player.scene._placement_scene import fit_box, make_dots, plain_mesh, pl
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.view._camera import Camera, Subject
 from fba_player.view._geometry import first_hit, project, ray_through, rotation_vector, transform, translation
-from fba_player.view._view import Colour, Dots, Extras, Eye, FaceMesh, FaceShape, Legend, Lines, View
+from fba_player.view._view import Colour, Dots, Extras, Eye, FaceMesh, FaceShape, Legend, Lines, Seen, View
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import Switches
 
@@ -66,7 +66,7 @@ class MarkersScene(Timed[CaptureTimes]):
         self.shows_cloud = where != "none"
         self.editing.beside = where == "beside"
 
-    def view_at(self, time: float) -> View:
+    def view_at(self, time: float, seen: Seen | None = None) -> View:
         """Return the head and the cloud at a time in seconds."""
         frame, after, share = self.timeline.position(time)
         vertices, pose = self._moved(frame, after, share)

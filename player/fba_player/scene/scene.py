@@ -14,7 +14,7 @@ from fba.choices import Axes
 from fba_player.playback._timeline import Timeline
 from fba_player.scene._framing import Extent, body_extent
 from fba_player.view._camera import FACE_PRESETS, Camera, Subject
-from fba_player.view._view import View
+from fba_player.view._view import Seen, View
 from fba_player.view.protocols import Timed
 from fba_player.view.switches import SWITCHES, Switches
 
@@ -174,30 +174,38 @@ class Scene(Timed[Timeline]):
         subject = self.face_subject if preset in FACE_PRESETS or not self.has_body else self.subject
         return Camera.preset(preset, subject, aspect)
 
-    def view_for(self, faps: Float32, baps: Float64) -> View:
-        """Return the view for FAPs (68,), as `fba.face.resolve` gives them, and BAPs (296,), if any."""
-        return self._make_view(faps, self._joints(baps) if self.has_body else None)
+    def view_for(self, faps: Float32, baps: Float64, seen: Seen | None = None) -> View:
+        """Return the view for FAPs (68,), as `fba.face.resolve` gives them, and BAPs (296,), if any.
+
+        seen: see `view_at`.
+        """
+        return self._make_view(faps, self._joints(baps) if self.has_body else None, seen)
 
     def still(self, faps: Float32) -> View:
         """Return the view for FAPs (68,), in the body's pose at the start."""
         return self._make_view(faps, self._pose_at(float(self.start))[1])
 
-    def view_at(self, time: float) -> View:
+    def view_at(self, time: float, seen: Seen | None = None) -> View:
         """Return the view at a time in seconds; before the start or after the end, the first or last frame.
 
+        seen: where from; a distant figure is then moved in no more detail than it is drawn in from there.
         Raises ValueError if the time is not finite.
         """
-        return self._make_view(*self._pose_at(time))
+        return self._make_view(*self._pose_at(time), seen)
 
-    def _make_view(self, faps: Float32, joints: Float64 | None) -> View:
-        view = self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints)
+    def _make_view(self, faps: Float32, joints: Float64 | None, seen: Seen | None = None) -> View:
+        if self.switches.changed:
+            seen = None  # they may show all vertices
+        view = (
+            self._points(faps, joints) if self._view == "points" else self._person_or_head(faps, joints, seen)
+        )
         if not self.switches.changed:
             return view
         from fba_player.scene._display_options import Posture
 
         return self._options.apply(view, self.switches, Posture(faps, self._face_matrix(joints), joints))
 
-    def _person_or_head(self, faps: Float32, joints: Float64 | None) -> View:
+    def _person_or_head(self, faps: Float32, joints: Float64 | None, seen: Seen | None) -> View:
         """Return the view of a person or a head."""
         if joints is None:
             world = np.eye(4)
@@ -205,7 +213,7 @@ class Scene(Timed[Timeline]):
         turned = self.person.joints(faps, joints)
         return View(
             eyes=self.person.eyes(faps, turned),
-            faces=self.person.meshes(faps, turned),
+            faces=self.person.meshes(faps, turned, seen),
             blobs=self._bones.shadows(joints),
             ground=True,
         )

@@ -26,7 +26,7 @@ from fba_player.session._exports import Exports
 from fba_player.session._keys import by_name
 from fba_player.session._source import Source
 from fba_player.view._camera import Camera
-from fba_player.view._view import View
+from fba_player.view._view import Seen, View
 from fba_player.view.protocols import Showable
 from fba_player.view.switches import SWITCHES, Switch
 
@@ -280,15 +280,15 @@ class Session:
         if self.audio is not None:
             self.audio.offset = self.sound_offset
 
-    def view(self, time: float, *, captured: bool = False) -> View:
+    def view(self, time: float, seen: Seen | None = None, *, captured: bool = False) -> View:
         """Return what is drawn at a time in seconds, after the hooks of `before_frame`.
 
-        captured: whether it is for a picture or film that is saved.
+        seen: see `Showable.view_at`. captured: whether it is for a picture or film that is saved.
         """
         scene = self.scene
         lives = self.life if self.transport.playing and self.recording is None and not captured else None
         if not isinstance(scene, Scene) or not (self.before_frame or lives):
-            return scene.view_at(time)
+            return scene.view_at(time, seen)
         faps, baps = scene.timeline.faps(time).copy(), scene.timeline.baps(time).copy()
         for hook in tuple(self.before_frame):
             hook(faps, baps)
@@ -296,7 +296,7 @@ class Session:
         if lives is not None:
             faps, baps = faps.copy(), baps.copy()
             lives(self.clock() - self._began, faps, baps)
-        return scene.view_for(faps, baps)
+        return scene.view_for(faps, baps, seen)
 
     def toggle_view(self) -> None:
         """Switch between the figure and its feature points and bones, where the scene has both views."""

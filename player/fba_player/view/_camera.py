@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fba.arrays import Float64
+from fba_player.view._view import Seen
 
 PITCH_LIMIT = 89.0
 DISTANCES = (0.05, 100.0)
@@ -182,6 +183,10 @@ class Camera:
     def clip_matrix(self, size: tuple[int, int]) -> Float64:
         """Return (4, 4) matrix from world to clip space, for a picture of this size in pixels."""
         return np.asarray(self.projection_matrix(size[0] / max(size[1], 1)) @ self.view_matrix())
+
+    def seen(self, height: int) -> Seen:
+        """Return where a picture of this height in pixels is seen from."""
+        return Seen(self.eye, 2 * math.tan(math.radians(self.field_of_view) / 2) / max(height, 1))
 
     def _axes(self) -> Float64:
         """Rows: right, up and backward of the camera, in the world."""

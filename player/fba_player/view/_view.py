@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 Colour = tuple[float, float, float, float]
 """Of annotations: red, green, blue as displayed (sRGB, 0..1), and opacity."""
 
+IRIS = (0.075, 0.105, 0.10)
+"""Colour of an iris of which none is known, linear light."""
 MOST_LIMBS = 12
 """Most limbs that keep the sky from a part; as in shaders/face.vert."""
 CAPSULE_FLOATS = 16
@@ -71,11 +73,11 @@ class FaceShape:
     tip, and 1 or -1 for its side; hairs narrower than a pixel are drawn a pixel wide and fainter. closed:
     whether the inside is never visible and not drawn. name, kind: of the model's part, "" if none begins.
     coarser: levels of detail of a body's part, None without any; levels: those of a face's, from fine to
-    coarse. casts: whether it casts a shadow on the ground. outer: int32 (F, 3), fewer
-    triangles that cast the same shadow; None for all. smooth: False
-    if triangles are so large that light changes visibly within them. wrinkle_places: float32 (V, 2), where
-    each vertex lies in `fba_player._mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity,
-    cutoff: as of `fba.mesh._meshes.Material`.
+    coarse. casts: whether it casts a shadow on the ground. outer: int32 (F, 3), fewer triangles that cast the
+    same shadow; None for all. outermost: still fewer, for the shadow of one body among several; None for
+    `outer`. smooth: False if triangles are so large that light changes visibly within them. wrinkle_places:
+    float32 (V, 2), where each vertex lies in `fba_player._mesh.wrinkle_map`, None for a part without
+    wrinkles. alpha, opacity, cutoff: as of `fba.mesh._meshes.Material`.
     """
 
     triangles: Int32
@@ -94,6 +96,7 @@ class FaceShape:
     levels: tuple[CoarseShape, ...] = ()
     casts: bool = False
     outer: Int32 | None = None
+    outermost: Int32 | None = None
     smooth: bool = True
     wrinkle_places: Float32 | None = None
     alpha: Alpha = "auto"
@@ -152,8 +155,9 @@ class FaceMesh(NamedTuple):
     each wrinkle on the left and the right side; None for none. looks: `FaceShape.looks` in place of the
     shape's own, while one level of detail becomes another. limbs: float32 (2 K, 4), for at most `MOST_LIMBS`
     limbs that keep the sky from the part: both ends of each, in the frame of the positions, each with the
-    radius (m); None for none. Do not write to the arrays: renderers recognise by their identity what they
-    have uploaded.
+    radius (m); None for none. finest: number of the first level of detail for which the arrays are complete;
+    vertices that only finer ones have may be missing, see `Seen`. Do not write to the arrays: renderers
+    recognise by their identity what they have uploaded.
     """
 
     shape: FaceShape
@@ -167,6 +171,21 @@ class FaceMesh(NamedTuple):
     wrinkles: Float32 | None = None
     looks: Float32 | None = None
     limbs: Float32 | None = None
+    finest: int = 0
+
+
+class Seen(NamedTuple):
+    """Where a view is seen from: what is far away need not be moved in all its detail.
+
+    eye: (3,), of the camera. pixel: the width of a pixel at distance 1.
+    """
+
+    eye: Float64
+    pixel: float
+
+    def move(self, offset: Float64) -> Seen:
+        """Return the same as seen by what is moved by offset (3,), metres, afterwards."""
+        return Seen(self.eye - offset, self.pixel)
 
 
 class Eye(NamedTuple):
@@ -183,7 +202,7 @@ class Eye(NamedTuple):
     pupil: float
     lids: Float64
     axes: Float64
-    tint: tuple[float, float, float] = (0.075, 0.105, 0.10)
+    tint: tuple[float, float, float] = IRIS
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Generic, Protocol, Self, TypeVar
 
 from fba_player.view._camera import Camera
-from fba_player.view._view import View
+from fba_player.view._view import Seen, View
 from fba_player.view.switches import Switches
 
 
@@ -148,8 +148,11 @@ class Showable(Protocol):
     def show(self, name: str, on: object = True) -> None:
         """Set one of `fba_player.view.switches.SWITCHES`; ValueError for an unknown name or value."""
 
-    def view_at(self, time: float) -> View:
-        """Return everything to be drawn at a time in seconds; ValueError if it is not finite."""
+    def view_at(self, time: float, seen: Seen | None = None) -> View:
+        """Return everything to be drawn at a time in seconds; ValueError if it is not finite.
+
+        seen: where from, to leave out detail that is too small to be seen.
+        """
 
     def camera(self, preset: str | None = None, aspect: float = 16 / 9) -> Camera:
         """Return a camera for a preset, or what the content suggests; ValueError for an unknown name."""

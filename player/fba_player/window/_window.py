@@ -277,8 +277,9 @@ class Window(Closing):
         time = self.transport.time
         self._target.begin()
         gradual = wall.perf_counter() if session.recording is None else None  # films need no clock
-        view, smoothed = session.view(time), self._target.smoothed
-        within = self._renderer.draw(view, session.camera(time), size, gradual, smoothed=smoothed)
+        camera, smoothed = session.camera(time), self._target.smoothed
+        view = session.view(time, camera.seen(size[1]))
+        within = self._renderer.draw(view, camera, size, gradual, smoothed=smoothed)
         if self._renderer.morphing:
             self._pictures_due = max(self._pictures_due, 1)
         self._target.finish(self._gl.screen, within)

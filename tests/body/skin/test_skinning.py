@@ -109,6 +109,21 @@ def test_a_vertex_of_one_joint_is_carried_alike() -> None:
 
 
 @both
+def test_a_skinner_of_some_vertices_moves_them_alike(method: str) -> None:
+    body = BodyModel.default()
+    matrices = random_pose(body, 3)
+    rows = np.random.default_rng(4).choice(len(body.vertices), 900, replace=False)
+    every, some = (np.empty((2, *body.vertices.shape), dtype=np.float32) for _ in range(2))
+    skinner = body.skinner.restrict(rows)
+    assert 900 <= len(skinner.rows) < len(body.vertices)
+    body.skinner.skin(matrices, *every, method)
+    skinner.skin(matrices, *some, method)
+    np.testing.assert_array_equal(every[:, rows], some[:, rows])
+    with pytest.raises(IndexError):
+        body.skinner.restrict([len(body.vertices)])
+
+
+@both
 def test_many_frames_are_many_single_ones(method: str) -> None:
     body = rod()
     frames = np.stack([random_pose(body, seed) for seed in range(70)])

@@ -15,6 +15,8 @@ from fba.face.model import FaceModel
 from fba.player import Scene
 from fba_player._figure.face import build_figure
 from fba_player._figure.person import Person, build_person
+from fba_player.gl._lod import Details
+from fba_player.view._view import Seen
 from player_tracks import body_track, face_track
 
 STILL = np.zeros(68, dtype=np.float32)
@@ -108,3 +110,26 @@ def test_real_clips_stand_on_the_ground(shared: Path) -> None:
         view = scene.view_at(float(scene.start) + share * float(scene.duration))
         lowest = min(float(mesh.positions[:, 1].min()) for mesh in view.faces)
         assert -0.06 < lowest < 0.06
+
+
+@pytest.mark.parametrize("away", [0.7, 2.0, 5.0, 12.0, 40.0])
+def test_what_is_moved_for_a_distance_is_drawn_as_if_all_were(away: float) -> None:
+    """The vertices of the levels of detail that are chosen there, and those of a body's shadow."""
+    pose = {32: 9000, 60: 90000, 61: -40000}
+    scene = Scene(Animation(25, np.arange(1), face_track([{3: 600, 19: 500}]), body_track([pose])))  # type: ignore[arg-type]
+    seen = Seen(np.array([0.3, 1.2, away]), 0.0006)
+    every, some = scene.view_at(0.0), scene.view_at(0.0, seen)
+    assert (some.faces[-1].finest > 0) == (away > 3)
+    details = Details()
+    for one, other in zip(*(details.choose(v.faces, *seen) for v in (every, some)), strict=True):
+        assert one.shape is other.shape
+        used = np.unique(one.shape.triangles)
+        for field in ("positions", "normals"):
+            np.testing.assert_array_equal(getattr(one, field)[used], getattr(other, field)[used])
+        np.testing.assert_allclose(one.light[used], other.light[used], atol=1e-6)
+
+
+def test_switches_show_all_vertices() -> None:
+    scene = Scene(Animation(25, np.arange(1), body=body_track([{}])))  # type: ignore[arg-type]
+    scene.show("wireframe")
+    assert scene.view_at(0.0, Seen(np.array([0.0, 1.0, 40.0]), 0.0006)).faces[-1].finest == 0

@@ -12,7 +12,7 @@ from fba.face import FaceModel
 from fba.mesh.simplify import Level, place_on_level
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player.gl._lod import MORPH_SECONDS, Details
-from fba_player.view._view import FaceMesh
+from fba_player.view._view import FaceMesh, FaceShape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba faces are drawn as they are")
 PIXEL = 0.0006
@@ -29,6 +29,11 @@ def meshes(figure: FaceFigure, **faps: int) -> list[FaceMesh]:
     for name, value in faps.items():
         values[int(name[1:]) - 1] = value
     return figure.meshes(values, np.eye(4))
+
+
+def shapes(chosen: list[FaceMesh]) -> list[FaceShape]:
+    """But those of hairs, of which each `Details` has its own."""
+    return [mesh.shape for mesh in chosen if mesh.shape.across is None]
 
 
 def triangles(chosen: list[FaceMesh]) -> int:
@@ -83,8 +88,8 @@ def test_levels_change_gradually_and_end_as_the_coarser_one(figure: FaceFigure) 
     done = details.choose(full, FAR, PIXEL, now=2.0 + MORPH_SECONDS * 1.01)
     assert not details.morphing
     alone = Details().choose(full, FAR, PIXEL)
+    assert shapes(done) == shapes(alone)
     for one, other in zip(done, alone, strict=True):
-        assert one.shape is other.shape
         assert one.looks is None
         np.testing.assert_array_equal(one.positions, other.positions)
     parents = full[0].shape.levels[1].parents
@@ -105,7 +110,7 @@ def test_without_a_clock_a_picture_depends_on_nothing_before_it(figure: FaceFigu
     details.choose(full, FAR, PIXEL, now=1.1)
     drawn = details.choose(full, FAR, PIXEL)
     assert not details.morphing
-    assert [mesh.shape for mesh in drawn] == [mesh.shape for mesh in Details().choose(full, FAR, PIXEL)]
+    assert shapes(drawn) == shapes(Details().choose(full, FAR, PIXEL))
 
 
 def test_two_persons_with_one_face_have_levels_of_their_own(figure: FaceFigure) -> None:
@@ -121,4 +126,27 @@ def test_two_persons_with_one_face_have_levels_of_their_own(figure: FaceFigure) 
 def test_a_face_without_levels_is_drawn_in_full() -> None:
     plain = build_figure(replace(FaceModel.default(), levels=()))
     full = meshes(plain)
-    assert [mesh.shape for mesh in Details().choose(full, FAR, PIXEL)] == [mesh.shape for mesh in full]
+    assert shapes(Details().choose(full, FAR, PIXEL)) == shapes(full)
+
+
+@pytest.mark.parametrize(("away", "halvings"), [(1.0, 0), (4.0, 1), (20.0, 4)])
+def test_of_lashes_much_narrower_than_a_pixel_fewer_are_drawn(
+    figure: FaceFigure, away: float, halvings: int
+) -> None:
+    full = meshes(figure)
+    for mesh, drawn in zip(full, Details().choose(full, (0.0, 0.0, away), PIXEL), strict=True):
+        assert len(drawn.shape.sway) == len(drawn.positions) == len(drawn.light)
+        if mesh.shape.across is not None and drawn.shape.across is not None:
+            fewer = 2**halvings if mesh.shape.kind == "lash" else 1
+            assert len(drawn.shape.triangles) == pytest.approx(len(mesh.shape.triangles) / fewer, rel=0.1)
+            assert len(drawn.shape.across) == len(drawn.positions)
+
+
+def test_a_level_that_was_not_moved_is_not_drawn(figure: FaceFigure) -> None:
+    """As after a jump of the camera: the change to the level at hand is at once, then gradual again."""
+    full, details = meshes(figure), Details()
+    details.choose(full, NEAR, PIXEL, now=1.0)
+    moved = [mesh._replace(finest=1) for mesh in full]
+    drawn = details.choose(moved, FAR, PIXEL, now=1.1)
+    assert drawn[0].shape is full[0].shape.levels[0].shape
+    assert details.morphing

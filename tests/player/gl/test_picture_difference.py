@@ -108,6 +108,6 @@ class TestOfPictures:
         scene = case.scene()
         whole = draw(case, scene)
         view = scene.view_at(0.0)
-        scene.view_at = lambda time: replace(view, eyes=view.eyes[:1])  # type: ignore[method-assign]
+        scene.view_at = lambda time, seen=None: replace(view, eyes=view.eyes[:1])  # type: ignore[method-assign]
         found = difference(whole, draw(case, scene))
         assert not found.alike, str(found)

@@ -178,7 +178,7 @@ class TestPictures:
             behind = view.marks[:, 0] < -0.005  # the other side of the face
             assert behind.sum() > 25
             hidden = replace(view, marks=view.marks[~behind])
-            scene.view_at = lambda time: hidden  # type: ignore[method-assign]
+            scene.view_at = lambda time, seen=None: hidden  # type: ignore[method-assign]
             without = offscreen.frame(0.0).astype(int)
         faint = np.abs(whole - without)[100:220, 100:260].max(axis=2)
         assert (faint > 4).sum() > 10

@@ -8,7 +8,7 @@ about its bone by the difference.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
@@ -44,7 +44,7 @@ class Skinner:
     vertices, normals: float32 (V, 3), as modelled. joints: int32 (V, 4). weights: float32 (V, 4), largest
     first, rows sum to 1. counts: int32 (V,), number of weights above 0. inverse: float64 (J, 4, 4), inverses
     of the joints as modelled. parents: int64 (J,). neighbours: int32 (V, 4), and coefficients: float32
-    (V, 3), see `fba.body.skin._moving_normals`.
+    (V, 3), see `fba.body.skin._moving_normals`. rows: int64 (N,), vertices that it moves; see `restrict`.
 
     Calls allocate nothing but their result. Threads that share a Skinner wait for each other.
     """
@@ -60,12 +60,22 @@ class Skinner:
     girdle: Girdle
     neighbours: Int32
     coefficients: Float32
+    rows: Int64
 
     def __post_init__(self) -> None:
         self._vertices, self._normals = self.vertices.copy(), self.normals.copy()
         self._twisted, self._twisted_is_modelled = self.vertices.copy(), True
         self._scratch = np.empty((len(self.inverse), 12), dtype=np.float32)
         self._lock = threading.Lock()
+
+    def restrict(self, rows: npt.ArrayLike) -> Skinner:
+        """Return a skinner that moves only these vertices (N,), and what their normals need: other rows of
+        its results have no meaning. IndexError for vertices that do not exist."""
+        wanted = np.zeros(len(self.vertices), dtype=bool)
+        wanted[np.asarray(rows)] = True
+        near = self.neighbours[wanted]
+        wanted[near[near >= 0]] = True
+        return replace(self, rows=np.flatnonzero(wanted))
 
     def skin(
         self,
@@ -119,7 +129,7 @@ class Skinner:
             )
             skin = loops.Skin(
                 vertices, rest_normals, self.joints, self.weights, self.counts, self.neighbours,
-                self.coefficients, self.inverse, self._scratch,
+                self.coefficients, self.inverse, self._scratch, self.rows,
             )  # fmt: skip
             twisted = vertices
             if method == "dual" and len(self.twists.rows):
@@ -196,6 +206,7 @@ def build_skinner(
         girdle=find_girdle(skeleton, bind, vertices, joints, weights),
         neighbours=neighbours,
         coefficients=coefficients,
+        rows=np.arange(len(vertices), dtype=np.int64),
     )  # fmt: skip
 
 
