@@ -43,7 +43,7 @@ NAIL_COLOUR = (1.16, 1.12, 1.14, 2.0)
 """Factors of the complexion and of its gloss on nails."""
 UNDER = 0.02
 """Skin stays this far (m) under the edges of clothes."""
-TUCKED = 0.011
+TUCKED = 0.014
 """Metres of neck under the collar: more would show through when the head is thrown back."""
 EVENED = 1.46
 """Height above which the skull's weights are smoothed, metres."""
