@@ -61,6 +61,8 @@ TEETH_SHARE = 0.3
 """The same for teeth, which stand out against the dark behind them."""
 TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""
+HAIRS = ("lash", "brow")
+"""Kinds of parts that do not count in a level's error."""
 LOCK_TRIANGLES = 16
 """Hair of pieces with fewer triangles than this, on average, is locks that lie upon other hair."""
 LOCK_COST = 1e-5
@@ -102,16 +104,19 @@ class FaceSimplification:
     def error(self, level: Level) -> float:
         """Return the distance (m) within which 99 % of the full face's vertices are of a level, in the worst
         pose."""
-        return max(self._errors(level, lambda away: float(np.percentile(away, PERCENT))))
+        return max(self._errors(level, lambda away: float(np.percentile(away, PERCENT)), level.gone))
 
-    def _errors(self, level: Level, sum_up: Callable[[Float64], float]) -> list[float]:
-        """Return, for each pose, a number for the distances (V,) of the full face's vertices from a level."""
+    def _errors(self, level: Level, sum_up: Callable[[Float64], float], left_out: Bool) -> list[float]:
+        """Return, for each pose, a number for the distances (N,) of the full face's vertices from a level.
+
+        left_out: (V,), vertices that do not count; nor do those of pieces that are gone.
+        """
         rows, weights = place_on_level(self.mesh.positions, level)
         errors = []
         for pose in self.poses:
             moved = level.positions + level.carry(pose - self.poses[0])
             off = np.einsum("nk,nkd->nd", weights, moved[rows]) - pose
-            errors.append(sum_up(np.linalg.norm(off[~level.gone], axis=1)))
+            errors.append(sum_up(np.linalg.norm(off[~(level.gone | left_out)], axis=1)))
         return errors
 
     def build(self, level: Level, *, tables: bool = True) -> DetailLevel:
@@ -128,9 +133,10 @@ class FaceSimplification:
         if tables:
             fitted = fit_tables(model, face, level, self._unmoved(level), self.mesh.positions)
             face = self._mend(replace(face, tables=fitted), level)
-        return DetailLevel(
-            face, level.parents, max(self._errors(level, _root_mean_square)), shape_key(model.parts)
-        )
+        # Single hairs, hardly a pixel wide, do not decide when a level is good enough.
+        hairs = np.concatenate([np.full(len(part.vertices), part.kind in HAIRS) for part in model.parts])
+        off = max(self._errors(level, _root_mean_square, hairs))
+        return DetailLevel(face, level.parents, off, shape_key(model.parts))
 
     def _mend(self, face: FaceModel, level: Level) -> FaceModel:
         """Return the face with other tables for FAPs whose own break rules: with lids that meet, carried, or
