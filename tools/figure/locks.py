@@ -14,9 +14,9 @@ SEGMENTS = 2
 GLOSS = 0.3
 GROUPS = (
     # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
-    ("fringe", 150, (0.000, 0.014), (0.011, 0.021), 0.00058, 0.0020),
-    ("edge", 110, (-0.001, 0.009), (0.006, 0.012), 0.00042, 0.0010),
-    ("crown", 90, (0.012, 1.0), (0.014, 0.026), 0.00062, 0.0032),
+    ("fringe", 100, (0.000, 0.014), (0.011, 0.021), 0.00066, 0.0020),
+    ("edge", 60, (-0.001, 0.009), (0.006, 0.012), 0.00048, 0.0010),
+    ("crown", 65, (0.012, 1.0), (0.014, 0.026), 0.00070, 0.0032),
 )
 SWEEP = -0.45
 """Radians by which the fringe turns, to the subject's right."""

@@ -37,7 +37,7 @@ from fba.sampling import smoothstep
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"
-TEETH = np.array([0.0, -0.0728, 0.0829])
+TEETH = np.array([0.0, -0.0725, 0.0829])
 """Point at which the edges of the middle incisors meet."""
 BEHIND = 0.012
 """Metres from there to the middle of the lips."""

@@ -38,7 +38,7 @@ def level_triangles(shape: FaceShape, number: int) -> Int32 | None:
     """Return int32 (F, 3): the triangles of a level of a body's part or of hairs; None for all."""
     if number and shape.coarser is not None:
         return shape.coarser.triangles_within(TOLERANCES[number - 1])
-    return fewer_hairs(shape.triangles, number) if number and shape.across is not None else None
+    return _fewer_hairs(shape.triangles, number) if number and shape.across is not None else None
 
 
 def needed_vertices(shape: FaceShape, number: int) -> Bool:
@@ -66,7 +66,7 @@ def _halvings(across: Float32, pixel: float) -> int:
     return min(int(math.log2(max(narrow, 1.0))), MOST_HALVINGS)
 
 
-def fewer_hairs(triangles: Int32, halvings: int) -> Int32:
+def _fewer_hairs(triangles: Int32, halvings: int) -> Int32:
     """Return the triangles (F, 3) of every second, fourth ... hair."""
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.intp)
     hair = join_pieces(np.concatenate([edges, edges[:, ::-1]]), int(triangles.max(initial=0)) + 1)

@@ -9,7 +9,6 @@ import numpy as np
 from fba.arrays import Int64
 from fba.body import BodyModel
 from fba.face import FaceModel
-from fba_player._figure.detail import fewer_hairs
 from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._figure.model_units import prepare_model
 from fba_player._figure.person import Person, build_person
@@ -20,8 +19,6 @@ from fba_player.web._face_packing import Chosen, pack_face_parts
 from fba_player.web._look_packing import pack_relief
 
 VERSION = 2
-MANY_HAIRS = 800
-"""A part of single hairs with more triangles than this is packed with half as many."""
 
 
 class Packed(NamedTuple):
@@ -69,7 +66,5 @@ def _choose(figure: FaceFigure, shapes: dict[str, FaceShape], *, eyes: bool) -> 
         shape = shapes.get(part.name)
         if shape is not None or part.name in balls:
             triangles = part.triangles if shape is None else shape.triangles
-            if shape is not None and shape.across is not None and len(triangles) > MANY_HAIRS:
-                triangles = fewer_hairs(triangles, 1)  # every second makes a smaller page, and looks the same
             chosen.append((part, triangles, model.starts[part.name], shape))
     return [each for each in chosen if len(each[1])]
