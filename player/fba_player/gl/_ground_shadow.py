@@ -188,7 +188,7 @@ def _frame_around(points: Float32) -> tuple[float, float, float]:
     seen = points @ BEFORE
     least, most = seen.min(axis=0), seen.max(axis=0)
     width = FRAMED * float(np.ceil((most - least).max() / FRAMED + 0.4))
-    u, v = np.floor(((least + most) / 2 - width / 2) * TEXELS / width) * width / TEXELS  # whole texels
+    u, v = (least + most) / 2 - width / 2  # not in whole texels: shadows would jump as a head turns
     return float(u), float(v), 1 / width
 
 
