@@ -16,7 +16,7 @@ from fba_player.export.photo_sheet import photo_sheet
 from tools.photos.rendered_faces import varied_head
 
 SIZE = (720, 880)
-SEED = 12
+SEED = 3
 TURNS = {"front": 6.0, "side": 86.0}
 """Degrees to the person's left from which the photographs are taken."""
 

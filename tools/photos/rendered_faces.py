@@ -38,8 +38,10 @@ SKIN_RANGE = (0.25, 1.25)
 """Factors on the brightness of the built-in skin, from dark to pale."""
 INNER = (*HIDDEN, "11.1", "11.2", "11.3", "11.4", "11.6")
 """Points that are not varied: inside, or on the skull."""
-HAIR = 110
-"""Brightness of the built-in skin's picture below which it is hair."""
+HAIR = 120
+"""Red of the built-in skin's picture below which it is hair."""
+STRANDS = 3.0
+"""Pixels over which that is blurred: bright strands are hair, too."""
 
 
 def rendered_faces(count: int, seed: int) -> Iterator[tuple[UInt8, Float64]]:
@@ -74,10 +76,13 @@ def varied_head(random: np.random.Generator, *, brows: bool = True) -> FaceModel
             head = fit(replace(base, tables=()), points, unit="m")
     except FbaError:
         return None
-    return replace(
-        head,
-        parts=tuple(_coloured(part, random, brows) if part.kind == "skin" else part for part in head.parts),
-    )
+    parts = {part.name: part for part in head.parts}
+    for part in head.parts:
+        if part.kind == "skin":
+            parts[part.name] = _coloured(part, random, brows)
+        elif part.kind == "hair" and part.colours is not None:  # locks have the colours of other hair
+            parts[part.name] = replace(part, colours=part.colours * np.float32([1, 1, 1, 0]))
+    return replace(head, parts=tuple(parts.values()))
 
 
 def _coloured(part: Part, random: np.random.Generator, with_brows: bool) -> Part:
@@ -85,7 +90,7 @@ def _coloured(part: Part, random: np.random.Generator, with_brows: bool) -> Part
     pixels = read_pixels(part.material.texture or b"", 1024)
     assert pixels is not None
     picture = pixels[..., :3].astype(np.float64)
-    hair = picture.mean(axis=2) < HAIR
+    hair = gaussian_filter(picture[..., 0], STRANDS) < HAIR
     low, high = SKIN_RANGE
     tone = random.uniform(low, high) * (1 + 0.12 * random.standard_normal(3) * (0.3, 0.6, 1.0))
     mean = picture[~hair].mean(axis=0)

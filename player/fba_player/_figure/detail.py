@@ -56,7 +56,7 @@ def needed_vertices(shape: FaceShape, number: int) -> Bool:
 
 
 def sampled(count: int) -> slice:
-    """Return which of so many vertices give a part's distance to the camera."""
+    """Return which of a number of vertices give a part's distance to the camera."""
     return slice(None, None, max(count // SAMPLED_VERTICES, 1))
 
 

@@ -37,7 +37,7 @@ NO_TURN = np.zeros(3)
 REACH_MARGIN = 1.1
 """How much further from joints vertices may get than they are as modelled."""
 NEARER = 1.5
-"""A face's levels of detail are at hand up to so many times nearer: they change gradually."""
+"""A face's levels of detail are at hand this many times nearer than they are drawn: they change gradually."""
 MOST_MOVERS = 8
 """How many choices of vertices are kept, a few megabytes each."""
 CARRIED = ("skin", "mouth", "hair", "other")

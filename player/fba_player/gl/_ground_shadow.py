@@ -29,7 +29,7 @@ FRAMED = 0.25
 WIDTH = 4.8
 """Metres of ground, along each side, for one body."""
 COARSE = 2.0
-"""Shadows are cast coarsely on ground that is more than so many times as wide."""
+"""Shadows are cast coarsely on ground that is wider than this, in multiples of `WIDTH`."""
 ACROSS = unit(np.array([KEY_DIRECTION[2], 0.0, -KEY_DIRECTION[0]]))
 BEFORE = np.stack([ACROSS, np.cross(unit(np.array(KEY_DIRECTION)), ACROSS)], axis=1).astype(np.float32)
 """(3, 2): axes of the map that the key light sees, as in shaders/lighting.glsl."""
