@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -81,9 +83,9 @@ def test_pictures_films_and_pauses_have_no_life() -> None:
     seen: list[np.ndarray] = []
     make = scene.view_for
 
-    def view_for(faps: np.ndarray, baps: np.ndarray) -> object:
+    def view_for(faps: np.ndarray, baps: np.ndarray, *rest: Any) -> object:
         seen.append(faps)
-        return make(faps, baps)
+        return make(faps, baps, *rest)
 
     scene.view_for = view_for  # type: ignore[method-assign, assignment]
     session.view(0.0)
