@@ -118,7 +118,7 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1] * fissure])
     # Between the teeth it is darker.
     side = np.concatenate([np.tile(np.abs(cx) ** 6, len(rows)), [0.0]])
-    colours = colours * (1 - side[:, None] * (0.30, 0.42, 0.50))
+    colours = colours * (1 - side[:, None] * (0.14, 0.22, 0.28))
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 
