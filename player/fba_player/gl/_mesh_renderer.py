@@ -52,7 +52,8 @@ class FaceRenderer:
         self._pixels: UInt8 | None = None
         self._camera: tuple[Float64, bytes, float] = (np.zeros(3), b"", 1.0)
         self._shade: Shade | None = None
-        self._aside = context.simple_framebuffer((1, 1))
+        self._aside_colour = context.renderbuffer((1, 1), 4)
+        self._aside = context.framebuffer([self._aside_colour])
 
     def begin(self, eye: Float64, matrix: Float64, pixel: float, shade: Shade | None = None) -> None:
         """Set the camera: its position (3,), the matrix (4, 4) to clip space, a pixel's size; and shadows."""
@@ -93,6 +94,7 @@ class FaceRenderer:
             *self._wrinkles.values(),
             *self._programs.values(),
             self._aside,
+            self._aside_colour,
         ):
             part.release()
         self._reliefs.clear()

@@ -35,7 +35,9 @@ def pack_body_parts(container: Container, person: Person, face_rows: Int64) -> t
         shape = person.body_shapes.get(part.name)
         if shape is not None and len(shape.triangles):
             chosen.append((part, shape.triangles, body.starts[part.name], shape))
-    reduced = reduce_parts(container, chosen)
+    # Along seams of textures vertices are there twice, and share their normals.
+    seams = np.unique(body.vertices.round(5), axis=0, return_inverse=True)[1].ravel()
+    reduced = reduce_parts(container, chosen, seams)
     skull = skull_of(body)
     skeleton, default = body.skeleton, Skeleton.default()
     grounded = has_feet(skeleton) and skeleton is not default
