@@ -54,7 +54,7 @@ HEMMED, STITCHED = 0.0018, 0.0006
 """Metres by which cloth stands out where it is doubled along an edge, and by which stitches draw it in."""
 ROUNDED = ((0.0012, -0.0003), (0.0021, -0.0014), (0.0020, -0.0028))
 """Rows that round an edge: metres beyond it, and outwards."""
-LEANING = (2.2, 1.7, 1.2, 0.5)
+LEANING = (0.9, 0.8, 0.6, 0.4)
 """Shares of outwards to beyond in the normals of these rows and of what is folded in.
 
 Surfaces that face the limb would be nearly black, and a dark rim narrower than a pixel looks jagged.
