@@ -50,7 +50,7 @@ def forms(points: Float64, places: Float64, at: Floating) -> Float64:
     from scipy.interpolate import RBFInterpolator
 
     row = point_rows()
-    known = [at for name, at in row.items() if name not in CHEEKS and np.isfinite(points[at, 0])]
+    known = [here for name, here in row.items() if name not in CHEEKS and np.isfinite(points[here, 0])]
     fixed = np.unique(np.round(points[known], 5), axis=0)
     beside = places[:, 0] > 0
     centres = np.concatenate([fixed, places, places[beside] * (-1, 1, 1)])

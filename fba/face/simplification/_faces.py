@@ -21,8 +21,9 @@ from fba.face.checks._posing import Poser
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import PUPIL_FAP
 from fba.face.importers.assembly._repair import repair_tables, take_sounder
-from fba.face.model import DetailLevel, FaceModel, Part, shape_key
+from fba.face.model import DetailLevel, FaceModel, shape_key
 from fba.face.simplification._tables import close_lids, find_balls, find_lines, fit_tables
+from fba.mesh import connected
 from fba.mesh.simplify import (
     Level,
     Simplification,
@@ -104,19 +105,19 @@ class FaceSimplification:
     def error(self, level: Level) -> float:
         """Return the distance (m) within which 99 % of the full face's vertices are of a level, in the worst
         pose."""
-        return max(self._errors(level, lambda away: float(np.percentile(away, PERCENT)), level.gone))
+        return max(self._errors(level, lambda away: float(np.percentile(away, PERCENT)), ~level.gone))
 
-    def _errors(self, level: Level, sum_up: Callable[[Float64], float], left_out: Bool) -> list[float]:
+    def _errors(self, level: Level, sum_up: Callable[[Float64], float], counted: Bool) -> list[float]:
         """Return, for each pose, a number for the distances (N,) of the full face's vertices from a level.
 
-        left_out: (V,), vertices that do not count; nor do those of pieces that are gone.
+        counted: (V,), the vertices whose distances these are.
         """
         rows, weights = place_on_level(self.mesh.positions, level)
         errors = []
         for pose in self.poses:
             moved = level.positions + level.carry(pose - self.poses[0])
             off = np.einsum("nk,nkd->nd", weights, moved[rows]) - pose
-            errors.append(sum_up(np.linalg.norm(off[~(level.gone | left_out)], axis=1)))
+            errors.append(sum_up(np.linalg.norm(off[counted], axis=1)))
         return errors
 
     def build(self, level: Level, *, tables: bool = True) -> DetailLevel:
@@ -135,7 +136,7 @@ class FaceSimplification:
             face = self._mend(replace(face, tables=fitted), level)
         # Single hairs, hardly a pixel wide, do not decide when a level is good enough.
         hairs = np.concatenate([np.full(len(part.vertices), part.kind in HAIRS) for part in model.parts])
-        off = max(self._errors(level, _root_mean_square, hairs))
+        off = max(self._errors(level, _root_mean_square, ~(level.gone | hairs)))
         return DetailLevel(face, level.parents, off, shape_key(model.parts))
 
     def _mend(self, face: FaceModel, level: Level) -> FaceModel:
@@ -232,17 +233,6 @@ def _find_pinned(model: FaceModel) -> Bool:
     return pinned
 
 
-def _count_pieces(part: Part) -> int:
-    """Return the number of connected pieces of a part."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    size = len(part.vertices)
-    rows, columns = part.triangles.ravel(), np.roll(part.triangles, 1, axis=1).ravel()
-    joined = coo_array((np.ones(len(rows)), (rows, columns)), shape=(size, size))
-    return int(connected_components(joined, directed=False, return_labels=False))
-
-
 def _importance(model: FaceModel) -> Float64:
     """Return (V,): factors of the cost, by how much of a FAP's motion reaches each vertex of the skin."""
     share = np.zeros(len(model.vertices))
@@ -268,7 +258,8 @@ def _importance(model: FaceModel) -> Float64:
             share[start : start + len(part.vertices)] = counts
     importance = 1.0 + IMPORTANCE * share**2
     for part in model.of_kind("hair"):
-        if len(part.triangles) <= LOCK_TRIANGLES * _count_pieces(part):
+        edges = part.triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+        if len(part.triangles) <= LOCK_TRIANGLES * len(np.unique(connected(edges, len(part.vertices)))):
             start = model.starts[part.name]
             importance[start : start + len(part.vertices)] = LOCK_COST
     return importance

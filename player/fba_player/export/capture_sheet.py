@@ -19,14 +19,14 @@ from fba_player.export._sheet_layout import lay_out
 from fba_player.scene.scene import Scene
 from fba_player.view._camera import Camera, Subject
 from fba_player.view._geometry import transform
-from fba_player.view._view import View
+from fba_player.view._view import FaceShape, View
 
 TILE = (400, 480)
 """Width and height of one of the two pictures of a frame, in pixels."""
 SUPERSAMPLING = 2
 """Everything is painted this many times larger, and then reduced, which smooths edges."""
-SKIN_COLOUR = np.array([0.62, 0.34, 0.23])
-"""Linear colour of skin that has a texture: about its mean."""
+TEXTURE_SIZE = 128
+"""Pixels to which textures are reduced: a triangle has one colour."""
 HIDDEN_KINDS = ("teeth", "tongue", "lash", "mouth")
 """Parts of a face that are too small to see, or behind the lips."""
 COLOURS = {"l": "#1f77b4", "r": "#d1495b", "": "#4a4e57"}
@@ -141,12 +141,21 @@ def _person(view: View) -> tuple[Float64, Float64]:
         if mesh.shape.kind in HIDDEN_KINDS or mesh.shape.across is not None:
             continue
         points = transform(mesh.positions.astype(np.float64), mesh.matrix)
-        colour = mesh.shape.colours[:, :3].astype(np.float64)
-        if mesh.shape.kind == "skin" and mesh.shape.picture is not None:
-            colour = colour * SKIN_COLOUR
         triangles.append(points[mesh.shape.triangles])
-        colours.append(colour[mesh.shape.triangles].mean(axis=1))
+        colours.append(_triangle_colours(mesh.shape))
     return np.concatenate(triangles), np.concatenate(colours)
+
+
+def _triangle_colours(shape: FaceShape) -> Float64:
+    """Return (F, 3), the linear colours of a part's triangles, by its vertices and its texture."""
+    colours: Float64 = shape.colours[shape.triangles, :3].mean(axis=1, dtype=np.float64)
+    if shape.picture is not None and shape.texcoords is not None:
+        pixels = shape.picture.reduced(max(1, max(shape.picture.size) // TEXTURE_SIZE))
+        size = np.array(pixels.shape[1::-1])
+        at = shape.texcoords[shape.triangles].mean(axis=1) % 1.0 * size
+        column, row = np.minimum(at.astype(int), size - 1).T
+        colours = colours * (pixels[row, column, :3] / 255) ** 2  # roots of linear light
+    return colours
 
 
 class _Canvas:

@@ -64,9 +64,8 @@ class FaceRenderer:
             for program in self._programs.values():
                 self._set_camera(program)
 
-    def draw(self, meshes: list[FaceMesh]) -> None:
-        """Draw parts, the transparent ones last."""
-        gl = self._gl
+    def draw_opaque(self, meshes: list[FaceMesh]) -> None:
+        """Draw the parts that are not transparent."""
         opaque = [mesh for mesh in meshes if not mesh.shape.see_through]
         for number, mesh in enumerate(opaque, 1):
             self._draw(mesh)
@@ -74,6 +73,10 @@ class FaceRenderer:
                 # Software OpenGL collects triangles until another framebuffer is used, then fills pixels in
                 # threads of its own, while this one draws on. It slows down with what it has collected.
                 self._aside.clear()
+
+    def draw_transparent(self, meshes: list[FaceMesh]) -> None:
+        """Draw the other parts, over what they may let through."""
+        gl = self._gl
         transparent = [mesh for mesh in meshes if mesh.shape.see_through]
         for mesh in transparent:  # pixels that are nearly opaque hide what is behind them, in any order
             if mesh.shape.alpha == "blend":

@@ -133,12 +133,12 @@ class Renderer:
         self._draw_capsules(view.capsules)
         self._draw_marks(view.marks)
         self._faces.begin(eye, matrix, pixel, shade and shade._replace(finely=not smoothed))
-        self._faces.draw([mesh for mesh in drawn.faces if not mesh.shape.see_through])
+        self._faces.draw_opaque(drawn.faces)
         gl.enable(gl.CULL_FACE)
         for ball in view.eyes:  # after the skin, which hides most of them, and before lashes
             self._draw_eye(ball)
         gl.disable(gl.CULL_FACE)
-        self._faces.draw([mesh for mesh in drawn.faces if mesh.shape.see_through])
+        self._faces.draw_transparent(drawn.faces)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
         if not smoothed:

@@ -80,7 +80,7 @@ def draw(context: Any, shown: FaceMesh, shade: Shade | None = None) -> npt.NDArr
     matrix = np.diag([1.0, 1.0, -0.2, 1.0])
     matrix[:3, 3] = -MIDDLE * (1.0, 1.0, 0.0)
     renderer.begin(MIDDLE + np.array([0.0, 0.0, 3.0]), matrix, 0.01, shade)
-    renderer.draw([shown])
+    renderer.draw_opaque([shown])
     pixels = np.frombuffer(target.read(components=3), dtype=np.uint8).reshape(SIZE, SIZE, 3)
     renderer.close()
     target.release()
