@@ -292,7 +292,7 @@ def _trouser_seams(p: Float64, tube: int) -> Float64:
     sides = np.abs(around - legs()[tube].turn / 4)
     inner = np.where(along > 0.16, np.abs(around + legs()[tube].turn / 4), 1.0)
     pocket = np.where((along < 0.16) & (along > 0.01), np.abs(around - 0.055 - 0.42 * along), 1.0)
-    fly = np.where((p[:, 2] > 0) & (along < 0.15), np.abs(np.abs(p[:, 0]) - 0.0), 1.0)
+    fly = np.where((p[:, 2] > 0) & (along < 0.15), np.abs(p[:, 0]), 1.0)
     return np.min([sides, inner, pocket, fly, np.abs(height_above_hem(p) - 0.022)], axis=0)
 
 

@@ -1,0 +1,40 @@
+"""Brows are followed where they are dark ridges, and left where nothing is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from fba.face.fitting._brows import BROWS, TRUST, USUAL, follow_brows
+from fba.face.fitting._features import FACE_SIZE, features
+from fba.face.fitting._points_file import FRONT_POINTS
+
+ROWS = [[FRONT_POINTS.index(name) for name in names] for names in BROWS]
+
+
+def drawn(places: np.ndarray, aside: float) -> np.ndarray:
+    """A grey face with two dark lines where brows are, moved to the side by some pixels."""
+    face = np.full(FACE_SIZE, 0.7)
+    for inner, top, outer in ROWS:
+        bow = np.polyfit(places[[inner, top, outer], 0], places[[inner, top, outer], 1], 2)
+        for x in np.linspace(places[inner, 0], places[outer, 0], 200):
+            y = np.polyval(bow, x) + USUAL
+            face[int(y) - 2 : int(y) + 3, round(x + aside)] = 0.2
+    return gaussian_filter(face, 0.7)
+
+
+@pytest.mark.parametrize("aside", [-5.0, 0.0, 5.0])
+def test_ends_go_part_of_the_way_to_where_a_brow_ends(aside: float) -> None:
+    places = features().mean
+    found = follow_brows(drawn(places, aside), places)
+    for inner, _, outer in ROWS:
+        for row, trust in ((inner, TRUST[0, 0]), (outer, TRUST[2, 0])):
+            assert found[row, 0] - places[row, 0] == pytest.approx(trust * aside, abs=trust * 3)
+    others = np.setdiff1d(np.arange(len(places)), np.ravel(ROWS))
+    np.testing.assert_array_equal(found[others], places[others])
+
+
+def test_a_face_without_brows_keeps_its_points() -> None:
+    places = features().mean
+    np.testing.assert_array_equal(follow_brows(np.full(FACE_SIZE, 0.7), places), places)
