@@ -19,10 +19,10 @@ HINGES = (
 over which weights change from one to the other, on the side that folds and on the one that stretches."""
 LIMB = 0.06
 """Approximate distance from bone to skin, metres."""
-ARMHOLE = (0.026, 0.060)
+ARMHOLE = (0.026, 0.080)
 """Metres to both sides of a sleeve's seam over which weights change from trunk to arm: at the armpit and at
 the top."""
-SET = (0.020, 0.030)
+SET = (0.020, 0.0)
 """Metres from the shoulder outwards to that seam: at the armpit and at the top."""
 BEHIND = 0.022
 """How much further out it is at the back of the armpit, which an arm in front would carry downwards."""
@@ -34,6 +34,8 @@ BLADE = (-0.13, -0.01)
 """Heights from the shoulder between which the blade begins to carry the trunk, metres."""
 EASING_ROUNDS = 10
 """Rounds of smoothing the weights of trunk, arms and legs over neighbours."""
+HANGING, HANGING_ROUNDS = (0.86, 1.04), 20
+"""Heights about which weights are smoothed more, metres, and rounds of it: a shirt's hem hangs evenly there."""
 
 
 def ease_limb_weights(person: Person, positions: dict[str, Float64], weights: Float64) -> Float64:
@@ -63,7 +65,10 @@ def ease_limb_weights(person: Person, positions: dict[str, Float64], weights: Fl
         pit = positions[f"{side}_shoulder"] + np.array(PIT) * (1 if side == "l" else -1, 1, 1)
         free *= 1 - 0.7 * np.exp(-((np.linalg.norm(person.vertices - pit, axis=1) / 0.06) ** 2))
     mesh = Cloth(person.vertices, person.vertices, weights, weights, person.triangles)
-    return mesh.smooth_rows(weights, free, EASING_ROUNDS)
+    weights = mesh.smooth_rows(weights, free, EASING_ROUNDS)
+    free *= smoothstep((person.vertices[:, 1] - HANGING[0]) / 0.05)
+    free *= smoothstep((HANGING[1] - person.vertices[:, 1]) / 0.05) * (person.arms < 0.3)
+    return mesh.smooth_rows(weights, free, HANGING_ROUNDS)
 
 
 def _ease_shoulders(person: Person, positions: dict[str, Float64], weights: Float64) -> None:

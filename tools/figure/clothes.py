@@ -31,7 +31,7 @@ SHIRT = np.array([0.052, 0.088, 0.125])
 TROUSERS = np.array([0.054, 0.059, 0.070])
 INSIDE, RIM = 1.7, 1.5
 """Brightness of the inside of clothes, and of their rims, relative to the cloth: little light gets there."""
-HEM, WAIST = 0.932, 0.982
+HEM, WAIST = 0.918, 0.982
 TURN_UP = (0.066, 0.48)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
 SLEEVE = 0.62
@@ -123,11 +123,12 @@ def make_shirt(body: Body) -> Garment:
     kind = np.where(arms, 0, np.where(p[:, 1] > 1.25, 1, 2))
     loose = smoothstep((1.30 - p[:, 1]) / 0.25)
     collar = ~arms * smoothstep(1 - depth_below_collar(p) / 0.05) * (p[:, 1] > 1.25)
+    below = np.maximum(-vertex_normals(p, body.person.triangles)[:, 1], 0.0)  # cloth hangs under an arm
     thick = (
-        0.0046
+        0.0042
         + 0.0075 * loose * ~arms
         + 0.0026 * collar  # a bent neck must stay below it
-        + 0.0075 * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
+        + (0.0035 + 0.008 * below) * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
     )
     return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.4 * loose, 14, SHIRT, 0.014)
 
@@ -145,8 +146,8 @@ def make_trousers(body: Body) -> Garment:
     thick = (
         0.0010
         + 0.0025 * smoothstep((0.95 - p[:, 1]) / 0.05)
-        + 0.0105 * below
-        + 0.006 * smoothstep((0.35 - p[:, 1]) / 0.25)
+        + 0.0095 * below
+        + 0.004 * smoothstep((0.30 - p[:, 1]) / 0.25)
     )
     return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
 

@@ -74,7 +74,7 @@ class Piece:
 def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
     """Return skin and garments of the body, and its rig."""
     person, bones = rig.make_rig()
-    person = rig.slope_shoulders(person, bones)
+    person = rig.shape_for_standing(person, bones)
     weights = _skull_weights(person, bones)
     body = clothes.Body(person, weights)
     made = {

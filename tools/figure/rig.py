@@ -37,10 +37,18 @@ HEAD = ("Head", "HeadEnd", "Jaw", "LeftEye", "RightEye")
 
 CAP = (-0.11, 0.05)
 """Heights from the joint over which moving in the cap fades in, metres."""
-LEFT = 0.45
+LEFT = 0.75
 """Share that remains of its distance beyond SIDE, at the upper of these heights."""
 SIDE = -0.010
 """Metres out from the joint from which that distance is measured."""
+DROP, DROPPED = 0.020, (0.02, 0.055)
+"""Metres by which the end of the shoulder is lowered, how far within the joint, and over which distance."""
+COLLAR = 0.085
+"""Metres from the midline within which it is not: there the neck, which a head brings, goes under a collar."""
+STRAIGHT = (0.09, 0.80)
+"""Heights between which the outline of a leg is evened out, metres."""
+EVEN, ROUND = 0.13, 0.16
+"""Metres along the leg over which it is, and the length that a radian around it counts as."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,25 +155,47 @@ def _share_forward(
     weights[:, a] *= 1 - ahead
 
 
-def slope_shoulders(person: Person, bones: Rig) -> Person:
-    """Return the person with the caps of both shoulders moved in, for hanging arms.
+def shape_for_standing(person: Person, bones: Rig) -> Person:
+    """Return the person reshaped where clothes lie on it, for hanging arms and straight legs.
 
     With the arms down, the cap of the figure's shoulder would stick out as a corner beside the joint; a
-    person's slopes from the neck into the arm. The cap is moved in there, and the correction transformed back
-    into the posture of the figure.
+    person's slopes from the neck into the arm. Cloth falls from the thigh past the hollows of knee and shin.
+    Both are made in the default posture, and transformed back into that of the figure.
     """
     upright = np.tile(np.eye(4), (len(bones.names), 1, 1))
     upright[:, :3, 3] = bones.centres
-    hanging = upright @ np.linalg.inv(bones.bind)  # from the posture of the figure to the default one
-    turned = np.einsum("vj,jab->vab", bones.weights, hanging)
+    standing = upright @ np.linalg.inv(bones.bind)  # from the posture of the figure to the default one
+    turned = np.einsum("vj,jab->vab", bones.weights, standing)
     positions = np.einsum(
         "vab,vb->va", turned, np.pad(person.vertices, ((0, 0), (0, 1)), constant_values=1.0)
-    )
-    shift = np.zeros_like(positions[:, :3])
+    )[:, :3]
+    shift = np.zeros_like(positions)
     for side, sign in (("l", 1.0), ("r", -1.0)):
         joint = bones.centres[bones.names.index(f"{side}_shoulder")]
-        out = sign * (positions[:, 0] - joint[0]) - SIDE
+        out = sign * (positions[:, 0] - joint[0])
         high = smoothstep((positions[:, 1] - joint[1] - CAP[0]) / (CAP[1] - CAP[0]))
-        shift[:, 0] -= sign * np.maximum(out, 0.0) * (1 - LEFT) * high
+        shift[:, 0] -= sign * np.maximum(out - SIDE, 0.0) * (1 - LEFT) * high
+        end = np.exp(-(((out + DROPPED[0]) / DROPPED[1]) ** 2))
+        end *= smoothstep((np.abs(positions[:, 0]) - COLLAR) / 0.05)
+        shift[:, 1] -= DROP * end * smoothstep((positions[:, 1] - joint[1] + 0.01) / 0.06)
+        knee = bones.centres[bones.names.index(f"{side}_knee")]
+        mine = (sign * positions[:, 0] > 0) & (person.arms < 0.5) & (positions[:, 1] < STRAIGHT[1])
+        shift[mine] += _straighten(positions[mine] - (knee[0], 0.0, knee[2]))
     back = np.einsum("vab,va->vb", turned[:, :3, :3], shift)  # by the inverse rotations
     return replace(person, vertices=person.vertices + back)
+
+
+def _straighten(p: Float64) -> Float64:
+    """Return by how much points (N, 3) about the upright axis of a leg are moved, to even out its outline."""
+    turn, away = np.arctan2(p[:, 0], p[:, 2]), np.hypot(p[:, 0], p[:, 2])
+    used = p[:, 1] > STRAIGHT[0]
+    # The height counts so that an even weighting reaches as far along the leg as `EVEN` says.
+    chart = np.stack([np.sin(turn) * ROUND, np.cos(turn) * ROUND, p[:, 1]], axis=1) / EVEN
+    moved = np.zeros_like(p)
+    for k in np.flatnonzero(used):
+        near = np.exp(-((chart[used] - chart[k]) ** 2).sum(axis=1))
+        # A straight line through the radii near it keeps the taper, also at the ends.
+        line = np.polyfit(p[used, 1] - p[k, 1], away[used], 1, w=np.sqrt(near))
+        moved[k] = p[k] * (1.0, 0.0, 1.0) * (line[1] / away[k] - 1)
+    fade = smoothstep((STRAIGHT[1] - p[:, 1]) / 0.20) * smoothstep((p[:, 1] - STRAIGHT[0]) / 0.05)
+    return moved * fade[:, None]
