@@ -22,7 +22,7 @@ LIMB = 0.06
 ARMHOLE = (0.026, 0.080)
 """Metres to both sides of a sleeve's seam over which weights change from trunk to arm: at the armpit and at
 the top."""
-SET = (0.020, 0.0)
+SET = (0.020, -0.012)
 """Metres from the shoulder outwards to that seam: at the armpit and at the top."""
 BEHIND = 0.022
 """How much further out it is at the back of the armpit, which an arm in front would carry downwards."""

@@ -29,8 +29,8 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
-INSIDE, RIM = 1.7, 1.5
-"""Brightness of the inside of clothes, and of their rims, relative to the cloth: little light gets there."""
+INSIDE = 1.6
+"""Brightness of the inside of clothes and of their rims, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.918, 0.982
 TURN_UP = (0.066, 0.48)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
@@ -208,7 +208,8 @@ def _make_garment(
         c, d = loop[:, 2:].T + count * row
         strips += [np.stack([b, a, c], axis=1), np.stack([b, c, d], axis=1)]
     faces = np.concatenate([cloth.triangles, *strips])
-    inner = np.arange(len(faces)) >= len(faces) - 2 * len(loop)
+    # Coarser meshes keep where shades meet: along the rim, which has the normals of the cloth.
+    inner = np.arange(len(faces)) >= len(cloth.triangles)
     # What is folded in moves with the cloth over it, or it would come out where that bends.
     over = cloth.weights[cKDTree(vertices).query(rows[-1], k=NEAREST)[1]].mean(axis=1)
     weights = np.concatenate([cloth.weights, *[cloth.weights[rim]] * len(ROUNDED), over])
@@ -222,8 +223,8 @@ def _make_garment(
     everything, values, faces, shade = _mirror(everything, values, faces, shade, side)
     everything, values, faces, tone = _split_by_shade(everything, values, faces, shade)
     weights, within, facing = values[:, :-4], values[:, -4], values[:, -3:]
-    inside = tone == INSIDE
-    tone[facing.any(axis=1) & ~inside] = RIM
+    inside = facing.any(axis=1)
+    tone[~inside] = 1.0
     colours = np.concatenate([tone[:, None] * colour, np.full((len(tone), 1), 0.06)], axis=1)
     return Garment(everything, faces, colours, weights, value, inside, within, facing)
 
