@@ -32,7 +32,7 @@ TROUSERS = np.array([0.054, 0.059, 0.070])
 INSIDE = 1.6
 """Brightness of the inside of clothes and of their rims, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.918, 0.982
-TURN_UP = (0.066, 0.48)
+TURN_UP = (0.073, 0.45)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
 SLEEVE = 0.62
 """Share of the upper arm that the sleeve covers."""
@@ -128,7 +128,7 @@ def make_shirt(body: Body) -> Garment:
         0.0042
         + 0.0075 * loose * ~arms
         + 0.0026 * collar  # a bent neck must stay below it
-        + (0.0035 + 0.008 * below) * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
+        + (0.0025 + 0.008 * below) * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
     )
     return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.4 * loose, 14, SHIRT, 0.014)
 
@@ -146,8 +146,8 @@ def make_trousers(body: Body) -> Garment:
     thick = (
         0.0010
         + 0.0025 * smoothstep((0.95 - p[:, 1]) / 0.05)
-        + 0.0095 * below
-        + 0.004 * smoothstep((0.30 - p[:, 1]) / 0.25)
+        + 0.0085 * below
+        + 0.0085 * smoothstep((0.19 - p[:, 1]) / 0.10)  # over the shoe
     )
     return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.35 * below, 10, TROUSERS, 0.016)
 

@@ -261,7 +261,7 @@ def _shirt_seams(p: Float64, tube: int) -> Float64:
 
 def _beyond_armhole(p: Float64) -> Float64:
     """Return (N,) metres from the armhole outwards; far where points (N, 3) are below it or on the shoulder."""
-    return np.where((p[:, 1] > 1.29) & (p[:, 1] < 1.43), np.abs(p[:, 0]) - ARMHOLE, 1.0)
+    return np.where((p[:, 1] > 1.29) & (p[:, 1] < 1.405), np.abs(p[:, 0]) - ARMHOLE, 1.0)
 
 
 def _trouser_seams(p: Float64, tube: int) -> Float64:

@@ -45,7 +45,7 @@ DROP, DROPPED = 0.025, (0.02, 0.055)
 """Metres by which the end of the shoulder is lowered, how far within the joint, and over which distance."""
 COLLAR = 0.085
 """Metres from the midline within which it is not: there the neck, which a head brings, goes under a collar."""
-STRAIGHT = (0.09, 0.80)
+STRAIGHT = (0.13, 0.80)
 """Heights between which the outline of a leg is evened out, metres."""
 EVEN, ROUND = 0.13, 0.16
 """Metres along the leg over which it is, and the length that a radian around it counts as."""
@@ -197,5 +197,5 @@ def _straighten(p: Float64) -> Float64:
         # A straight line through the radii near it keeps the taper, also at the ends.
         line = np.polyfit(p[used, 1] - p[k, 1], away[used], 1, w=np.sqrt(near))
         moved[k] = p[k] * (1.0, 0.0, 1.0) * (line[1] / away[k] - 1)
-    fade = smoothstep((STRAIGHT[1] - p[:, 1]) / 0.20) * smoothstep((p[:, 1] - STRAIGHT[0]) / 0.05)
+    fade = smoothstep((STRAIGHT[1] - p[:, 1]) / 0.20) * smoothstep((p[:, 1] - STRAIGHT[0]) / 0.08)
     return moved * fade[:, None]
