@@ -35,7 +35,7 @@ BLADE = (-0.13, -0.01)
 EASING_ROUNDS = 10
 """Rounds of smoothing the weights of trunk, arms and legs over neighbours."""
 HANGING, HANGING_ROUNDS = (0.86, 1.04), 20
-"""Heights about which weights are smoothed more, metres, and rounds of it: a shirt's hem hangs evenly there."""
+"""Heights (m) between which weights are smoothed more, for even hems of shirts, and rounds of it."""
 
 
 def ease_limb_weights(person: Person, positions: dict[str, Float64], weights: Float64) -> Float64:

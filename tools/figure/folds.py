@@ -260,7 +260,7 @@ def _shirt_seams(p: Float64, tube: int) -> Float64:
 
 
 def _beyond_armhole(p: Float64) -> Float64:
-    """Return (N,) metres from the armhole outwards; far where points (N, 3) are below it or on the shoulder."""
+    """Return (N,) metres from the armhole outwards; far where points (N, 3) are below or above its seam."""
     return np.where((p[:, 1] > 1.29) & (p[:, 1] < 1.405), np.abs(p[:, 0]) - ARMHOLE, 1.0)
 
 

@@ -44,11 +44,11 @@ SIDE = -0.010
 DROP, DROPPED = 0.025, (0.02, 0.055)
 """Metres by which the end of the shoulder is lowered, how far within the joint, and over which distance."""
 COLLAR = 0.085
-"""Metres from the midline within which it is not: there the neck, which a head brings, goes under a collar."""
+"""Metres from the midline within which it stays: the neck, which a head brings, goes under a collar there."""
 STRAIGHT = (0.13, 0.80)
 """Heights between which the outline of a leg is evened out, metres."""
 EVEN, ROUND = 0.13, 0.16
-"""Metres along the leg over which it is, and the length that a radian around it counts as."""
+"""Metres along the leg over which it is, and the length as which a radian around it counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,10 +187,9 @@ def shape_for_standing(person: Person, bones: Rig) -> Person:
 
 def _straighten(p: Float64) -> Float64:
     """Return by how much points (N, 3) about the upright axis of a leg are moved, to even out its outline."""
-    turn, away = np.arctan2(p[:, 0], p[:, 2]), np.hypot(p[:, 0], p[:, 2])
+    away = np.hypot(p[:, 0], p[:, 2])
     used = p[:, 1] > STRAIGHT[0]
-    # The height counts so that an even weighting reaches as far along the leg as `EVEN` says.
-    chart = np.stack([np.sin(turn) * ROUND, np.cos(turn) * ROUND, p[:, 1]], axis=1) / EVEN
+    chart = np.stack([ROUND * p[:, 0] / away, ROUND * p[:, 2] / away, p[:, 1]], axis=1) / EVEN
     moved = np.zeros_like(p)
     for k in np.flatnonzero(used):
         near = np.exp(-((chart[used] - chart[k]) ** 2).sum(axis=1))
