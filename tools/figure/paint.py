@@ -6,7 +6,7 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
-from hair import TONES, height_above_hairline, in_parting, noise, shortness, strand_reach, strand_tone
+from hair import TONES, height_above_hairline, noise, paint_locks
 from looks import ALEX, Looks
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.interpolate import PchipInterpolator
@@ -115,16 +115,10 @@ def _hair(colour: Float64, p: Float64, looks: Looks) -> Float64:
     above = height_above_hairline(p)
     near = above > -0.02
     p, above, hair = p[near], above[near], looks.hair
-    shadow = smoothstep((above + 0.010) / 0.016) * 0.55
-    cover = smoothstep((above + strand_reach(p, hair)) / 0.0022)
-    tone = strand_tone(p, hair)
+    tone, cover = paint_locks(p, hair)
     strands = np.stack([np.interp(tone, TONES, [c[k] for c in hair.colours]) for k in range(3)], axis=1)
-    # Through short hair skin is seen, in grains.
-    cover *= 1 - shortness(p) * (0.50 + 0.35 * noise(p, 0.0007, 69))
-    if not hair.curly:
-        parting = in_parting(p)
-        strands = _blend(strands * (1 - 0.35 * parting)[:, None], np.array(looks.scalp), 0.55 * parting)
-    below = _blend(colour[near], np.array(looks.scalp), shadow)
+    # Through sparse hair skin is seen, in the shade.
+    below = _blend(colour[near], np.array(looks.scalp), smoothstep((above + 0.006) / 0.012) * 0.55)
     colour[near] = _blend(below, strands, cover)
     return colour
 
