@@ -3,67 +3,118 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from looks import Hair
+from PIL import Image, ImageDraw
 from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.spatial import cKDTree
 
-from fba.arrays import Float64
+from fba.arrays import Bool, Float64
 from fba.rotations import unit
 from fba.sampling import smoothstep
 
 Complex128 = npt.NDArray[np.complex128]
 MIDDLE = np.array([0.0, 0.012, -0.085])
 """Point of the skull from which hair stands away."""
-TOP = (0.030, 0.085)
-"""Heights between which the hair reaches the thickness of the top, metres."""
+TOP = (0.0, 0.95)
+"""Slopes of the head, as the sine of the angle, between which the hair reaches the thickness of the top."""
 CALM = (0.080, 0.098)
 """Heights of the skin between which locks cease to stand out, metres."""
-PARTING = np.array([[0.030, 0.107, -0.048], [0.012, 0.106, -0.135]])
-"""Ends of the parting, on the subject's left; all strands lead away from it, metres."""
-STRAND = 0.00042
-"""Width of a strand that is told from its neighbours, metres."""
-LOCK = 0.0052
-"""Width of a lock of strands, metres."""
-CURL = 0.0056
-"""Breadth of a curl of curly hair, metres."""
+PARTING = np.array([[0.034, 0.071, 0.000], [0.012, 0.106, -0.135]])
+"""Ends of the parting, on the subject's left, from the hairline to the crown; all strands lead away from it,
+metres."""
 TONES = (-0.85, -0.30, 0.35, 1.0)
 """How bright hair is where it has each of its colours."""
 RADIUS = 0.1
 """Of the ball onto which places on the scalp are carried for their strands, metres."""
 VOLUMES = (
     # a place on the left, and how far around it, metres
-    ((0.062, 0.088, -0.085), (0.030, 0.030, 0.075)),
     ((0.0, 0.090, -0.020), (0.055, 0.030, 0.030)),
     ((0.0, 0.030, -0.185), (0.060, 0.045, 0.040)),
 )  # fmt: skip
-"""Where hair is thicker or thinner than elsewhere: at the edges of the top, above the forehead, behind."""
+"""Where hair is thicker than elsewhere: above the forehead, behind."""
 DEEPEST = -0.008
 """Least thickness: the skull is flatter at its corners than hair lets it look, metres."""
+EARS = (0.0795, 0.008)
+"""Farther from the middle, and lower, than this (m) there are ears, over which no hair is painted."""
 AXIS = -0.085
 """z of the vertical axis around which the angles of the hairline are measured."""
+
+
+LOCKS = (7000, 16000)
+"""How many locks of straight and of curly hair are painted."""
+STRANDS, SEGMENTS = 10, 6
+"""Of each lock, and straight pieces of each strand."""
+WIDTH = 0.0006
+"""Of a strand, metres."""
+PROFILES = np.array([[-0.32, -0.10, 0.0, 0.06, 0.12, 0.16], [-0.30, 0.05, 0.2, 0.2, 0.05, -0.30]])
+"""How much brighter a strand is from its root to its tip: of straight and of curly hair."""
+DARKEST, BRIGHTEST = -1.4, 1.4
+"""Tones at the ends of what a picture holds."""
+DEEP = (-0.9, -0.35)
+"""Tones between strands of straight and of curly hair."""
+REACH, SCALE, SOFT = 3.25, 900, 2.0
+"""Extent of `strand_places` away from the parting; pixels to a unit of them; pixels of blur."""
+SPARSER = 16
+"""One of so many points is enough to tell where locks grow."""
+
+
+@dataclass(frozen=True, eq=False)
+class Locks:
+    """Painted locks of hair, N of them, from the lowest to the topmost.
+
+    roots: places as of `strand_places`. lengths, widths: metres. headings: radians between the lock's root
+    and the line through it of `strand_places`; bends: from root to tip. tones: how bright. fullness: 0 where
+    hair is short and sparse, 1 where it is full.
+    """
+
+    roots: Complex128
+    lengths: Float64
+    widths: Float64
+    headings: Float64
+    bends: Float64
+    tones: Float64
+    fullness: Float64
 
 
 def grow(vertices: Float64, hair: Hair) -> Float64:
     """Return vertices (V, 3) of the skin with those of the scalp at the outside of the hair; symmetric."""
     folded = vertices * np.where(vertices[:, :1] < 0, (-1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
     above = height_above_hairline(folded)
-    full = hair.sides + hair.top * smoothstep((folded[:, 1] - TOP[0]) / (TOP[1] - TOP[0]))
+    towards = unit(folded - MIDDLE)
+    full = hair.sides + hair.top * smoothstep((towards[:, 1] - TOP[0]) / (TOP[1] - TOP[0]))
+    full = full + _roundness(folded, above > 0)
     for (place, reach), more in zip(VOLUMES, hair.volumes, strict=True):
         full = full + more * np.exp(-(((folded - place) / reach) ** 2).sum(axis=1))
     # Not on the crown, whose highest point is a feature point.
     lumps = hair.lumps * (1 - smoothstep((folded[:, 1] - CALM[0]) / (CALM[1] - CALM[0])))
     full = full + lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
     # Before the ears hair lies close to the head.
-    ahead = smoothstep((folded[:, 2] + 0.125) / 0.03) * (1 - smoothstep((folded[:, 1] + 0.015) / 0.085))
+    ahead = smoothstep((folded[:, 2] + 0.135) / 0.05) * (1 - smoothstep((folded[:, 1] + 0.015) / 0.085))
     full = full * (1 - 0.8 * ahead)
     # Locks end in a rounded edge, but hair of the nape grows thinner downwards.
     nape = smoothstep((-0.105 - folded[:, 2]) / 0.03) * smoothstep((0.02 - folded[:, 1]) / 0.03)
-    share = np.clip(above / (hair.rise * (1 + nape)), 0.0, 1.0) ** (0.6 + 0.4 * nape)
-    share *= smoothstep(above / 0.004)
+    share = np.clip(above / (hair.rise * (1 + nape)), 0.0, 1.0)
+    share = (share * (2 - share)) ** (0.6 + 0.4 * nape) * smoothstep(above / 0.004)
     return vertices + unit(vertices - MIDDLE) * (share * np.maximum(full, DEEPEST))[:, None]
+
+
+def _roundness(vertices: Float64, scalp: Bool) -> Float64:
+    """Return (V,) metres from vertices (V, 3) outwards to the smooth shape that fits those of the scalp best.
+
+    The skull is flat on top and has corners; hair is cut so that the head looks round.
+    """
+    x, y, z = unit(vertices - MIDDLE).T
+    radius = np.linalg.norm(vertices - MIDDLE, axis=1)
+    terms = np.stack([np.ones_like(x), y, z, y * y, y * z, z * z], axis=1)
+    best = np.linalg.lstsq(terms[scalp], radius[scalp], rcond=None)[0]
+    return terms @ best - radius
 
 
 def height_above_hairline(positions: Float64) -> Float64:
@@ -87,12 +138,10 @@ def scalp(positions: Float64, edge_width: float = 0.004) -> Float64:
     return smoothstep(height_above_hairline(positions) / edge_width + 0.5)
 
 
-def noise(positions: Float64, scale: float, seed: int, order: int = 1) -> Float64:
-    """Return (N,) noise in -1..1 at points (N, 3). scale: size of its grains, metres; order: of splines."""
-    from scipy.ndimage import map_coordinates
-
+def noise(positions: Float64, scale: float, seed: int) -> Float64:
+    """Return (N,) noise in -1..1 at points (N, 3). scale: size of its grains, metres."""
     lattice = np.random.default_rng(seed).uniform(-1, 1, (48, 48, 48))
-    return map_coordinates(lattice, (positions / scale).T, order=order, mode="grid-wrap")
+    return map_coordinates(lattice, (positions / scale).T, order=1, mode="grid-wrap")
 
 
 def strand_places(p: Float64) -> Complex128:
@@ -124,69 +173,97 @@ def _map_axes() -> tuple[Float64, Float64, Float64, float]:
     return ahead, np.cross(middle, ahead), middle, float(front @ ahead / (1 + front @ middle))
 
 
-def strand_noise(p: Float64, width: float, length: float, seed: int) -> Float64:
-    """Return (N,) noise in -1..1 with grains of this width across strands and length along them, metres."""
-    places = strand_places(p)
-    # Two patterns, one twice as fine as the other, so that strands are equally wide where they spread.
-    spread = np.abs(np.sinh(places)) * _map_axes()[3] * RADIUS * 2
-    octave = np.log2(np.maximum(spread, 1e-4) / RADIUS)
-    lower = np.floor(octave)
-    values = []
-    for level in (lower, lower + 1):
-        turn = RADIUS * 2.0**level / width
-        at = np.stack([turn * np.cos(places.imag), turn * np.sin(places.imag), level * 7.3], axis=1)
-        at[:, 2] += places.real * RADIUS / length
-        values.append(noise(at, 1.0, seed))
-    share = smoothstep(octave - lower)
-    mixed = (1 - share) * values[0] + share * values[1]
-    return mixed / np.sqrt((1 - share) ** 2 + share**2)
+def paint_locks(p: Float64, hair: Hair) -> tuple[Float64, Float64]:
+    """Return (N,) how bright hair is at points (N, 3), about -1..1, and (N,) how much of them it covers."""
+    above, places = height_above_hairline(p), strand_places(p)
+    picture = _draw_locks(_sow_locks(p, above, hair), hair)
+    at = np.stack([places.real, places.imag + np.pi]) * SCALE
+    drawn, cover = (map_coordinates(values, at, order=1) for values in picture)
+    # Between strands one sees deep into full hair, but the skin where it is sparse.
+    gaps = (1 - cover) * smoothstep((above - 0.002) / 0.010)
+    cover = cover + gaps
+    tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
+    if not hair.curly:
+        # Light from above glances off the strands where they turn down.
+        rise = unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69)
+        shine = np.exp(-(((rise - 0.74) / 0.14) ** 2))
+        tone = tone * (1 + 0.3 * shine) + 0.40 * shine
+        away = places.real * _metres(places) + 0.0011 * noise(p, 0.004, 67)
+        cover *= 1 - 0.22 * np.exp(-((np.maximum(away, 0) / 0.0013) ** 2))
+    ears = (np.abs(p[:, 0]) > EARS[0]) & (p[:, 1] < EARS[1])
+    return tone, np.where(ears, 0.0, cover)
 
 
-def strand_tone(p: Float64, hair: Hair) -> Float64:
-    """Return (N,) how bright the hair is at points (N, 3) of the scalp, about -1..1."""
+def _metres(places: Complex128) -> Float64:
+    """Return (N,) how many metres of the head a unit of `strand_places` is, the same in all directions."""
+    focus = _map_axes()[3]
+    steep = np.maximum(np.abs(np.sinh(places)), 0.03)
+    return 2 * RADIUS * focus * steep / (1 + np.abs(focus * np.cosh(places)) ** 2)
+
+
+def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
+    """Return locks that are evenly spread over points (N, 3) of the scalp, fewer towards the hairline.
+
+    above: (N,), heights above the hairline.
+    """
+    random, most = np.random.default_rng(61), LOCKS[int(hair.curly)]
+    roots = random.uniform((0, -np.pi), (REACH, np.pi), (6 * most, 2)) @ (1, 1j)
+    roots = roots[random.uniform(0, 0.11**2, len(roots)) < _metres(roots) ** 2]
+    p, above = p[::SPARSER], above[::SPARSER]
+    apart, nearest = cKDTree(unit(p - MIDDLE)).query(strand_points(roots))
+    height = above[nearest]
+    kept = (apart < 0.01) & (random.uniform(0, 1, len(roots)) < smoothstep((height + 0.004) / 0.009))
+    roots, height, places = roots[kept][:most], height[kept][:most], p[nearest[kept][:most]]
+    count = len(roots)
+    long = smoothstep((unit(places - MIDDLE)[:, 1] - 0.1) / 0.7)
+    full = smoothstep(height / 0.020)
+    normal, uniform = random.normal, random.uniform
+    tone = normal(0, 0.20, count) + 0.2 * noise(places, 0.016, 63)
     if hair.curly:
-        return _curl_tone(p)
-    wave = p + 0.0022 * np.stack([noise(p, 0.011, 70 + k) for k in range(3)], axis=1)
-    lock = strand_noise(wave, LOCK, 0.030, 61) + 0.6 * strand_noise(wave, LOCK / 2.2, 0.022, 62)
-    fine = strand_noise(wave, STRAND, 0.020, 63) + 0.7 * strand_noise(wave, 2.3 * STRAND, 0.026, 64)
-    # Light from above glances off the strands where they turn down.
-    rise = unit(p - MIDDLE)[:, 1] + 0.05 * strand_noise(wave, LOCK / 2.2, 0.2, 69)
-    shine = np.exp(-(((rise - 0.72) / 0.13) ** 2)) * (0.6 + 0.4 * fine)
-    return 0.40 * lock + 0.48 * fine + 0.42 * shine - 0.08
+        length, width = uniform(0.005, 0.009, count), uniform(0.0009, 0.0020, count)
+        heading = uniform(-np.pi, np.pi, count)
+        bend = uniform(2.5, 5.5, count) * random.choice((-1, 1), count)
+        order = tone = 0.7 * tone + 0.12 * noise(places, 0.0042, 64)
+    else:
+        length = (0.005 + full * (0.011 + 0.022 * long)) * uniform(0.7, 1.2, count)
+        width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
+        heading, bend = normal(0, 0.1, count), normal(0, 0.16, count) + 0.35 * noise(places, 0.020, 62)
+        tone += 0.3 * (1 - full)
+        order = -roots.real * (1 + 0.06 * normal(size=count))
+    order = np.argsort(order)
+    return Locks(*(values[order] for values in (roots, length, width, heading, bend, tone, full)))
 
 
-def shortness(p: Float64) -> Float64:
-    """Return (N,) 0..1 how short hair is cut at points (N, 3): it is shorn towards the nape."""
-    behind = smoothstep((-0.092 - p[:, 2]) / 0.02) * (1 - smoothstep((p[:, 1] + 0.030) / 0.035))
-    return behind * (1 - smoothstep(height_above_hairline(p) / 0.034))
+def _draw_locks(locks: Locks, hair: Hair) -> tuple[Float64, Float64]:
+    """Return two pictures on the plane of `strand_places`: tones times how much is covered, and the latter.
 
-
-def _curl_tone(p: Float64) -> Float64:
-    """Return (N,) as `strand_tone` for curls: strands that wind, bright upon dark."""
-    q = RADIUS * unit(p - MIDDLE)
-    fine = 0.34 * noise(q, 0.0004, 86) + 0.22 * noise(q, 0.0009, 89)
-    # Strands follow the contours of smooth random fields, loops as wide as a curl; curls lie upon curls.
-    tone, warp = np.zeros(len(p)), 0.0009 * np.stack([noise(q, 0.0028, 90 + k) for k in range(3)], axis=1)
-    for layer, seed in enumerate((83, 84, 85)):
-        field = noise(q + warp * (layer - 1) + 0.013 * layer, CURL * (1.15 - 0.2 * layer), seed, 3)
-        coils = 0.42 * np.sin(13 * field + 5 * fine) + 0.20 * np.sin(31 * field)
-        place = noise(q, CURL * 0.75, 93 + layer) - 0.02 if layer else np.ones(len(p))
-        cover = smoothstep(place / 0.16)
-        tone = (1 - cover) * (tone - 0.45 * smoothstep((place + 0.30) / 0.30) * (layer > 0)) + cover * coils
-    return tone + fine + 0.22 * noise(q, 1.6 * CURL, 87) + 0.14
-
-
-def strand_reach(p: Float64, hair: Hair) -> Float64:
-    """Return (N,) metres by which strands at points (N, 3) end below the hairline, or, negative, above it."""
-    if hair.curly:
-        return 0.0022 * noise(p, 0.0032, 52) + 0.0015 * noise(p, 0.0009, 53) + 0.003 * noise(p, 0.011, 51)
-    fine = strand_noise(p, 1.2 * STRAND, 0.2, 65)
-    nape = 1 + 1.2 * smoothstep((-0.12 - p[:, 2]) / 0.03)
-    return nape * (0.0030 * strand_noise(p, LOCK, 0.2, 66) + 0.0048 * fine + 0.0012 * noise(p, 0.0006, 54))
-
-
-def in_parting(p: Float64) -> Float64:
-    """Return (N,) 1 in the parting, 0 beside it, for points (N, 3)."""
-    away = strand_places(p).real * _map_axes()[3] * 2 * RADIUS
-    uneven = 0.0011 * noise(p, 0.004, 67) + 0.0006 * noise(p, 0.0012, 68)
-    return np.exp(-((np.maximum(away + uneven, 0.0) / 0.0016) ** 2))
+    The strands of a lock run together towards its tip. Straight locks lie like tiles, those nearer to the
+    parting on top; of curls, the bright ones do.
+    """
+    random = np.random.default_rng(62)
+    each = np.repeat(np.arange(len(locks.roots)), STRANDS)
+    full, length = locks.fullness[each], locks.lengths[each] * random.uniform(0.65, 1.1, len(each))
+    across = random.uniform(-1, 1, len(each))
+    tone = locks.tones[each] - 0.35 * across**2 + random.normal(0, 0.17, len(each))
+    path, widths, at = [], [], locks.roots[each]
+    at = at + (1 - full) * random.uniform(-0.006, 0.006, len(each)) / _metres(at)
+    side = 1j * across * locks.widths[each] / 2
+    for share in np.linspace(0, 1, SEGMENTS + 1):
+        metres, heading = _metres(at), np.exp(1j * (locks.headings + locks.bends * share))[each]
+        path.append(at + side * (1 - 0.7 * full * share**1.5) * heading / metres)
+        widths.append(WIDTH * (0.55 + 0.45 * full) * (1.05 - share) ** 0.5 / metres)
+        at = at + length / SEGMENTS / metres * heading
+    size = int(2 * np.pi * SCALE) + 2, int(REACH * SCALE) + 2
+    picture = Image.new("L", size)
+    draw = ImageDraw.Draw(picture)
+    points = SCALE * (np.stack([np.imag(path) + np.pi, np.real(path)], axis=-1))
+    profile = PROFILES[int(hair.curly)] * (0.3 + 0.7 * full[:, None])
+    fills = np.clip((tone[:, None] + profile - DARKEST) / (BRIGHTEST - DARKEST) * 254 + 1, 1, 255).astype(int)
+    sizes = np.maximum(np.rint(np.array(widths).T * SCALE), 1).astype(int).tolist()
+    for line, fill, wide in zip(points.swapaxes(0, 1).tolist(), fills.tolist(), sizes, strict=True):
+        for (a, b), value, breadth in zip(pairwise(line), fill, wide, strict=False):
+            draw.line((*a, *b), fill=value, width=breadth)
+    drawn = np.asarray(picture, dtype=np.float32)
+    covered = (drawn > 0).astype(np.float32)
+    tones = covered * ((drawn - 1) / 254 * (BRIGHTEST - DARKEST) + DARKEST)
+    return gaussian_filter(tones, SOFT), gaussian_filter(covered, SOFT)

@@ -1,4 +1,4 @@
-"""Locks that stand out from the layer of hair: narrow strips that hide its edge and break its outline."""
+"""Locks that stand out from the layer of hair: narrow strips that break its outline."""
 
 from __future__ import annotations
 
@@ -11,15 +11,12 @@ from fba.arrays import Float64, Integer
 from fba.rotations import unit
 
 SEGMENTS = 2
-GLOSS = 0.3
+GLOSS = 0.1
 GROUPS = (
     # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
-    ("fringe", 100, (0.000, 0.014), (0.011, 0.021), 0.00066, 0.0020),
-    ("edge", 60, (-0.001, 0.009), (0.006, 0.012), 0.00048, 0.0010),
-    ("crown", 65, (0.012, 1.0), (0.014, 0.026), 0.00070, 0.0032),
+    ("front", 70, (0.005, 0.030), (0.016, 0.028), 0.00070, 0.0030),
+    ("crown", 90, (0.012, 1.0), (0.014, 0.026), 0.00070, 0.0032),
 )
-SWEEP = -0.45
-"""Radians by which the fringe turns, to the subject's right."""
 NEIGHBOURS = 8
 """Vertices between which the depth of the layer is interpolated."""
 
@@ -36,12 +33,13 @@ def locks(bare: Float64, grown: Float64, triangles: Integer, hair: Hair) -> Mesh
         roots = _roots(bare, triangles, name, heights, count, random)
         length = random.uniform(*lengths, count)
         bend = random.normal(0.0, 0.10, count) + 0.30 * noise(roots, 0.012, 92)  # neighbours alike
-        bend += SWEEP if name == "fringe" else 0.0
+        lifts = lift * random.uniform(0.3, 1.3, count) * hair.loose
         if hair.curly:
-            bend, length = np.sign(bend) * random.uniform(1.0, 2.6, count), length * 0.62
-        paths = _paths(roots, length, bend, lift * random.uniform(0.3, 1.3, count) * hair.loose, depth)
+            bend, length = np.sign(bend) * random.uniform(1.4, 3.0, count), length * 0.40
+            lifts = -lifts if name == "front" else lifts  # hidden: single curls would look like scratches
+        paths = _paths(roots, length, bend, lifts, depth)
         blades += [_blade(path, width * random.uniform(0.6, 1.3)) for path in paths]
-        colours += list(_colours(random.normal(0.25, 0.40, count)))
+        colours += list(_colours(random.normal(0.15, 0.20, count)))
     pattern = blade_triangles(SEGMENTS)
     return join([(b, pattern, np.tile(c, (len(b), 1))) for b, c in zip(blades, colours, strict=True)])
 
@@ -74,21 +72,17 @@ def _roots(
 ) -> Float64:
     """Return (count, 3) points of the bare scalp, evenly spread over the places of a group.
 
-    heights: above the hairline, metres. The fringe is in front, the edge is the rest of the hairline.
+    heights: above the hairline, metres.
     """
     corners = bare[triangles]
-    middle = corners.mean(axis=1)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    if group != "crown":
-        area = area * (np.abs(height_above_hairline(middle)) < 0.03)
+    area *= np.abs(height_above_hairline(corners.mean(axis=1)) - heights[0]) < heights[1] - heights[0] + 0.01
     chosen = random.choice(len(triangles), 60 * count, p=area / area.sum())
-    shares = random.dirichlet(np.ones(3), len(chosen))
-    points = np.einsum("nk,nkd->nd", shares, corners[chosen])
+    points = np.einsum("nk,nkd->nd", random.dirichlet(np.ones(3), len(chosen)), corners[chosen])
     above = height_above_hairline(points)
-    front = (points[:, 2] > -0.055) & (points[:, 1] > 0.035)
     fits = (above > heights[0]) & (above < heights[1])
-    if group != "crown":
-        fits &= front == (group == "fringe")
+    if group == "front":
+        fits &= (points[:, 2] > -0.055) & (points[:, 1] > 0.035)
     return points[fits][:count]
 
 
@@ -120,6 +114,6 @@ def _blade(path: Float64, width: float) -> Float64:
 
 
 def _colours(tones: Float64) -> Float64:
-    """Return (N, 4) linear light and gloss of locks; tones: as of `hair.strand_tone`."""
+    """Return (N, 4) linear light and gloss of locks; tones: as of `hair.paint_locks`."""
     shown = np.stack([np.interp(tones, TONES, [c[k] for c in ALEX.hair.colours]) for k in range(3)], axis=1)
     return np.concatenate([(shown / 255) ** 2.2, np.full((len(tones), 1), GLOSS)], axis=1)

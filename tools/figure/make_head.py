@@ -57,7 +57,8 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
     outside = formed.tile == 0
     eyes = (from_eye < 0.026) & (z > 0.066)
     lips = (np.abs(x) < 0.034) & (y < -0.025) & (y > -0.098) & (z > 0.07)
-    refined = refine(formed, outside & (eyes | lips | (y > 0.03)))
+    skull = (y > 0.03) | ((y > -0.04) & (z < -0.076))
+    refined = refine(formed, outside & (eyes | lips | skull))
     marks = sculpt.refine_marks(refined, coarse)
     edges = unique_edges(refined.triangles)
     softened = sculpt.soften_crease(refined.vertices, marks, edges)
