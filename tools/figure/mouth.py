@@ -22,7 +22,7 @@ UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
-SINKING = np.array([0.0, 0.0, 0.0, 1.0, 2.7, 5.5, 8.4]) / 1000
+SINKING = np.array([0.0, 0.0, 0.3, 1.5, 3.4, 6.2, 8.8]) / 1000
 """Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides them."""
 SUNK_GUM = 0.4
 """Share of that by which their gum is deeper: so low a crown is short, too."""

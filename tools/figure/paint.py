@@ -219,6 +219,9 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     colour = _blend(colour, np.array(looks.socket), upper * 0.42 + lower * 0.46 + inner * 0.25)
     lid = near & (ring < 5.0)
     colour = _blend(colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.6, 0))
+    # The lower lid ends in a fold.
+    fold = np.where(near, np.exp(-(((ring - 7.0) / 1.3) ** 2)) * 0.35, 0.0) * smoothstep((-4 - y) / 5)
+    colour = _blend(colour, np.array(looks.socket), fold * (1 - smoothstep((x - 34) / 8)))
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.55, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.20, line)
