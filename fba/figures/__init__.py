@@ -48,11 +48,10 @@ def face(name: str = "alex") -> FaceModel:
     made = reshape(head, head.vertices + data["face_moves"] * STEP, data["points"].astype(np.float64))
     parts = []
     for part, tint in zip(made.parts, data["face_tints"], strict=True):
+        own = replace(part, colours=data["eye"]) if part.kind == "eye" else part
         if part.kind == "skin":
-            material = replace(part.material, texture=data["picture"].tobytes())
-            parts.append(replace(part, material=material))
-        else:
-            parts.append(_tint(replace(part, colours=data["eye"]) if part.kind == "eye" else part, tint))
+            own = replace(part, material=replace(part.material, texture=data["picture"].tobytes()))
+        parts.append(_tint(own, tint))
     levels = []
     for level in made.levels:
         coarse = [
@@ -92,7 +91,7 @@ def _read(name: str) -> dict[str, np.ndarray]:
 
 
 def _tint(part: AnyPart, tint: Floating) -> AnyPart:
-    """Return a part whose colours are multiplied by a tint (3,)."""
+    """Return a part whose colours and gloss are multiplied by a tint (4,)."""
     if part.colours is None or (tint == 1).all():
         return part
-    return replace(part, colours=np.clip(part.colours * np.append(tint, 1.0), 0.0, 1.0).astype(np.float32))
+    return replace(part, colours=np.clip(part.colours * tint, 0.0, 1.0).astype(np.float32))

@@ -38,6 +38,7 @@ class Looks:
     """One figure. Colours of the skin are sRGB, 0..255; of eyes and clothes, linear light.
 
     brow_height: of the brows, relative to the first figure's. lines: depth of the lines of an old skin, 0..1.
+    gloss: of the skin, relative to the first figure's.
     iris: inner and outer colour. shirt, trousers, shoes: factors of the first figure's colours.
     """
 
@@ -56,6 +57,7 @@ class Looks:
     brow: Colour
     brow_height: float = 1.0
     lines: float = 0.0
+    gloss: float = 1.0
     iris: tuple[Colour, Colour] = ((0.30, 0.17, 0.065), (0.075, 0.105, 0.100))
     shirt: Colour = (1.0, 1.0, 1.0)
     trousers: Colour = (1.0, 1.0, 1.0)
@@ -70,7 +72,7 @@ ALEX = Looks(
     ),
     skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
     waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(191, 114, 103), lip_line=(146, 78, 71),
-    freckle=(178, 118, 92), scalp=(112, 86, 73), brow=(52, 38, 30),
+    freckle=(178, 118, 92), scalp=(112, 86, 73), brow=(60, 44, 34),
 )  # fmt: skip
 """The built-in person: a young man with brown hair."""
 RUTH = Looks(
@@ -81,7 +83,7 @@ RUTH = Looks(
     ),
     skin=(128, 86, 66), blush=(132, 76, 62), socket=(94, 60, 48), neck=(120, 80, 61),
     waterline=(150, 98, 86), caruncle=(186, 118, 108), lip=(132, 78, 69), lip_line=(84, 45, 40),
-    freckle=(92, 58, 42), scalp=(84, 66, 58), brow=(66, 56, 52), brow_height=0.72, lines=1.0,
+    freckle=(92, 58, 42), scalp=(84, 66, 58), brow=(66, 56, 52), brow_height=0.72, lines=1.0, gloss=0.75,
     iris=((0.080, 0.040, 0.018), (0.038, 0.021, 0.012)),
     shirt=(3.0, 0.62, 0.45), trousers=(1.1, 0.75, 0.60), shoes=(0.8, 0.55, 0.45),
 )  # fmt: skip

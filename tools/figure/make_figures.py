@@ -41,19 +41,18 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
     assert eye.colours is not None
     offset = ORIGIN + np.array([0.0, figure.EYE_LEVEL, 0.0])
     moved = reshape(looks, body.vertices - offset) + offset
-    skin_tint = linear(looks.neck) / linear(ALEX.neck)
     tints = {"shirt": looks.shirt, "trousers": looks.trousers, "shoes": looks.shoes}
-    tints |= {"skin": skin_tint, "neck": skin_tint}
+    tints["skin"] = tints["neck"] = linear(looks.neck) / linear(ALEX.neck)
     tints["hair"] = np.mean([linear(c) for c in looks.hair.colours], axis=0) / np.mean(
         [linear(c) for c in ALEX.hair.colours], axis=0
     )
-    plain = np.ones(3)
+    gloss = {name: looks.gloss if name in ("skin", "neck") else 1.0 for name in tints}
+    tints = {name: np.append(tint, gloss[name]) for name, tint in tints.items()}
+    head_tints = tints | {"skin": np.append(np.ones(3), looks.gloss)}  # its picture has the colour
     return {
         "face": np.array(shape_key(head.parts)),
         "face_moves": settle(head, moves, points),
-        "face_tints": np.array(
-            [plain if part.kind == "skin" else tints.get(part.name, plain) for part in head.parts], np.float32
-        ),
+        "face_tints": np.array([head_tints.get(part.name, np.ones(4)) for part in head.parts], np.float32),
         "points": points.astype(np.float32),
         "eye": eye.colours.astype(np.float16),
         "picture": np.frombuffer(skin.material.texture, np.uint8),

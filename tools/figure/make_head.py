@@ -193,14 +193,14 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     y, z = surface.vertices[:, 1], surface.vertices[:, 2]
     oily = 1 - smoothstep(np.abs(surface.vertices[:, 0]) / 0.03)
     oily = oily * smoothstep((z + 0.01) / 0.02) * smoothstep((y + 0.05) / 0.03)
-    gloss = 0.38 + 0.06 * oily + 0.12 * lips + 0.05 * wet - 0.15 * wet * (marks.lip > 0) + 0.2 * lids
+    gloss = 0.32 + 0.05 * oily + 0.14 * lips + 0.05 * wet - 0.15 * wet * (marks.lip > 0) + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped) + 0.04 * cropped
     inside = near & (ring < 0)
     # The throat is darker than the cheeks.
     cheek = smoothstep((np.abs(surface.vertices[:, 0]) - 0.012) / 0.018)
-    depth = smoothstep((0.002 - z) / 0.060) * (1 - 0.5 * cheek)
-    depth = np.maximum(depth, 0.3 * smoothstep((-ring - 0.5) / 3.5)) * inside
+    depth = smoothstep((0.002 - z) / 0.060) * (1 - 0.75 * cheek)
+    depth = np.maximum(depth, 0.15 * smoothstep((-ring - 0.5) / 3.5)) * inside
     colours[:, :3] *= 1 - depth[:, None] * (0.62, 0.74, 0.74)
     colours[:, 3] *= np.where(
         near, 0.1 + 0.9 * smoothstep(ring / sculpt.CONTACT_RING), 1.0

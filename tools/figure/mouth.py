@@ -22,11 +22,13 @@ UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
-SINKING = np.array([0.0, 0.0, 0.0, 1.0, 2.7, 5.5, 8.4]) / 1000
+SINKING = np.array([0.0, 0.0, 0.3, 1.5, 3.4, 6.2, 8.8]) / 1000
 """Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides them."""
 SUNK_GUM = 0.4
 """Share of that by which their gum is deeper: so low a crown is short, too."""
-AROUND = 12
+TURNS = np.radians([0, 30, 60, 90, 120, 150, 180, 225, 270, 315])
+"""Places of the vertices around a crown, denser in front: behind, hardly anything is seen."""
+AROUND = len(TURNS)
 
 
 def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
@@ -83,11 +85,11 @@ def _arch(length: float, sign: float) -> tuple[Float64, float]:
 
 def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
     """Return the mesh of a crown: outer face at z = 0, edge at y = 0, gum towards sign x y."""
-    turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
-    cx, cz = _rounded_square(turn, 2.8)
+    cx, cz = _rounded_square(TURNS, 2.8)
     rows = np.array([0.0, 0.06, 0.32, 0.75, 1.12])  # edge to below the gum
-    # Narrow at the neck, widest near the edge; the edge of a front tooth is thin.
-    wide = np.interp(rows, [0, 0.05, 0.25, 0.7, 1.12], [0.86, 0.95, 1.0, 0.93, 0.76])
+    # Narrow at the neck, widest near the edge; the edge of a front tooth is thin. Neighbours meet within each
+    # other, so that however few triangles are left, there is no gap.
+    wide = np.interp(rows, [0, 0.05, 0.25, 0.7, 1.12], [0.95, 1.01, 1.03, 1.00, 0.88])
     deep = np.interp(rows, [0, 0.05, 0.3, 0.8, 1.12], [flat * 0.80, flat, 0.35 + 0.6 * flat, 0.92, 1.0])
     bulge = np.interp(rows, [0, 0.3, 0.8, 1.12], [0.0, 0.00050, 0.00075, -0.0002])
     vertices = np.zeros((len(rows), AROUND, 3))
@@ -111,14 +113,14 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
     # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
-    shaded = (0.90, 0.88, 0.86) if sign > 0 else (0.86, 0.80, 0.78)
+    shaded = (0.94, 0.92, 0.90) if sign > 0 else (0.90, 0.85, 0.83)
     behind = np.array(shaded) ** (max(place - 2, 0) ** 1.15)
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * behind
     fissure = 1.0 if flat < 0.5 else 0.72
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1] * fissure])
     # Between the teeth it is darker.
     side = np.concatenate([np.tile(np.abs(cx) ** 6, len(rows)), [0.0]])
-    colours = colours * (1 - side[:, None] * (0.14, 0.22, 0.28))
+    colours = colours * (1 - side[:, None] * (0.04, 0.09, 0.12))
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 

@@ -29,8 +29,8 @@ TAPER = ((1.0, 110), (0.7, 190), (0.4, 255))
 """Shares of a brow's hair from its root, and how opaque they are, 0..255: it ends in a point."""
 BROW = np.array([
     # along the left brow: x, y, extent downwards and upwards (mm)
-    (12.5, 14.5, 3.4, 3.2), (18, 17.6, 4.0, 3.6), (26, 20.8, 3.9, 3.4), (35, 23.0, 3.2, 3.0),
-    (44, 22.6, 2.4, 2.4), (52, 19.0, 1.6, 1.7), (59, 13.6, 0.7, 0.8),
+    (12.5, 14.6, 3.7, 3.3), (18, 17.4, 4.3, 3.8), (26, 20.2, 4.2, 3.6), (35, 22.1, 3.5, 3.2),
+    (44, 21.8, 2.7, 2.6), (52, 18.5, 1.9, 1.9), (59, 13.6, 0.9, 0.9),
 ]) / 1000  # fmt: skip
 
 
@@ -151,10 +151,10 @@ def _spot(p: Float64, centre: tuple[float, float, float], radius: float) -> Floa
 def _complexion(p: Float64, looks: Looks) -> Float64:
     colour = np.tile(looks.skin, (len(p), 1))
     colour = _blend(colour, np.array(looks.neck), smoothstep((-0.095 - p[:, 1]) / 0.05) * 0.9)
-    broad = 0.75 + 0.5 * noise(p, 0.011, 1)
+    broad = 0.85 + 0.3 * noise(p, 0.011, 1)
     for centre, radius, share in (
-        ((40, -37, -4), 44, 0.62), ((0, -38, 33), 22, 0.75), ((14, -40, 14), 14, 0.55),
-        ((0, -104, 6), 26, 0.45), ((24, -66, 8), 16, 0.30),
+        ((40, -37, -4), 48, 0.42), ((0, -38, 33), 22, 0.40), ((14, -40, 14), 14, 0.30),
+        ((0, -104, 6), 26, 0.30), ((24, -66, 8), 16, 0.20),
         ((84, -15, -98), 44, 0.12), ((0, 40, 12), 40, 0.10),
     ):  # fmt: skip
         colour = _blend(colour, np.array(looks.blush), _spot(p, centre, radius) * share * broad)
@@ -243,12 +243,13 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     inner = _spot(p, (17, 1, 2), 13)
     colour = _blend(colour, np.array(looks.socket), upper * 0.42 + lower * 0.46 + inner * 0.25)
     lid = near & (ring < 5.0)
-    colour = _blend(
-        colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.75, 0)
-    )
+    colour = _blend(colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.6, 0))
+    # The lower lid ends in a fold.
+    fold = np.where(near, np.exp(-(((ring - 7.0) / 1.3) ** 2)) * 0.35, 0.0) * smoothstep((-4 - y) / 5)
+    colour = _blend(colour, np.array(looks.socket), fold * (1 - smoothstep((x - 34) / 8)))
     # The roots of the lashes form a line along the outer edge of the lid margin.
-    line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.78, 0.0)
-    line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.26, line)
+    line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.55, 0.0)
+    line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.20, line)
     line *= smoothstep((x - 19.0) / 5.0) * (1 - 0.85 * smoothstep((x - 37.5) / 4.0))
     colour = _blend(colour, np.array(ALEX.brow), line)
     caruncle = near & (ring < 1.6) & (x < 24)
@@ -268,7 +269,7 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Loo
     )
     colour = _blend(colour, lip, red * 0.85)
     seam = np.where(near, smoothstep((2.1 - ring) / 1.2), 0.0) * (1 - 0.6 * corner)
-    colour = _blend(colour, np.array(looks.lip_line), seam * 0.7)
+    colour = _blend(colour, np.array(looks.lip_line), seam * 0.45)
     inside = np.where(near, smoothstep((0.6 - ring) / 1.2), 0.0)
     colour = _blend(colour, MOUTH, inside)
     # A light edge above the upper lip.

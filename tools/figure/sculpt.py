@@ -277,12 +277,16 @@ def _fuller_lips(vertices: Float64, marks: Marks) -> Float64:
 
 
 def _nose(vertices: Float64) -> Float64:
-    """Return vertices with the tip of the nose a little lower, so that the nostrils face down, not ahead."""
+    """Return vertices with a finer, lower tip of the nose, so that the nostrils face down, not ahead."""
     tip = np.array([0.0, -0.0385, 0.106])
     distance = np.linalg.norm((vertices - tip) * (0.75, 1.0, 0.8), axis=1)
     weight = 1 - smoothstep((distance - 0.004) / 0.020)
     vertices = vertices.copy()
     vertices[:, 1] -= 0.0024 * weight
+    # Narrower, with a flatter front than a ball's.
+    vertices[:, 0] *= 1 - 0.10 * weight
+    away = np.linalg.norm((vertices - tip)[:, :2], axis=1)
+    vertices[:, 2] -= 0.0007 * np.exp(-((away / 0.006) ** 2)) * weight
     return vertices
 
 

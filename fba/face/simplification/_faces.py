@@ -58,7 +58,7 @@ EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
 LASH_SHARE = 0.4
 """The same for lashes: a hair has little area, yet its lack is seen."""
-TEETH_SHARE = 0.3
+TEETH_SHARE = 1.0
 """The same for teeth, which stand out against the dark behind them."""
 TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""

@@ -31,7 +31,7 @@ TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
 MAX_HAIR_WIDTH = 0.0012
 """Strips wider than this (m) are not single hairs."""
-RELIEF_STRENGTHS = {"skin": 0.60, "cloth": 0.22}
+RELIEF_STRENGTHS = {"skin": 0.45, "cloth": 0.22}
 """Strength of the relief of skin and of woven cloth."""
 NECK_LENGTH = 2.3
 """Length over which the neck bends, in multiples of the eye-nose separation (ENS)."""

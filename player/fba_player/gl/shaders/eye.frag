@@ -72,8 +72,9 @@ void main() {
     float under = margin(in_head.x, lids[0]) - in_head.y;
     float above = in_head.y - margin(in_head.x, lids[1]);
     float shade = smoothstep(-0.06, 0.50, under);
-    shade = (0.14 + 0.86 * shade) * (0.45 + 0.55 * smoothstep(-0.05, 0.20, above));
-    shade *= 1.0 - 0.45 * aside;
+    float far = soft * 1.2;   // of a few pixels, dark edges would be all that is seen
+    shade = mix(0.14 + far, 1.0, shade) * mix(0.45 + far, 1.0, smoothstep(-0.05, 0.20, above));
+    shade *= 1.0 - (0.45 - far) * aside;
     // The iris is lit like a hollow: on the side away from the light.
     vec3 hollow = normalize(mix(n, normalize(n - 0.9 * (ball * vec3(at.xy, 0.0))), cornea));
     float key = max(dot(hollow, KEY_DIRECTION) * 0.75 + 0.25, 0.0);
