@@ -32,7 +32,7 @@ WIDTH = 4.0
 COARSE = 2.4
 """Shadows are cast coarsely on ground that is wider than this, in multiples of `WIDTH`."""
 CONTACT = 1.12
-"""Metres, along each side, of the ground around feet that is looked at finely; twice that in long steps."""
+"""Metres, along each side, of the ground that is looked at finely around feet; twice that in long steps."""
 BEYOND = 0.5
 """Metres by which it is wider than the feet are apart, at least."""
 SKY_REACH, KEY_REACH = 1.1, 0.8
