@@ -37,8 +37,8 @@ def compiled(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Like `compiled`, for small helpers that only compiled functions call."""
-    return _compiled(function, forceinline=True)
+    """Like `compiled`, for small helpers that only compiled functions call: Python cannot."""
+    return _compiled(function, forceinline=True, no_cpython_wrapper=True)
 
 
 def _compiled(function: Function, **options: bool) -> Function:

@@ -7,6 +7,8 @@ squares in a fixed number of small steps: the result depends on the pose alone, 
 No smooth rule brings every hand out of a body and leaves those outside in place: one behind the middle of a
 thigh or trunk, seen from where its arm hangs, is shown inside where it would change sides.
 
+Whole rows are not computed at once in compiled code: numba takes seconds to compile that.
+
 Bounds: `find_contact` makes all arrays for the joints of one skeleton, and `Contact.keep_apart` takes no
 matrices of another shape; angles are in 0..1 turn, and heights are checked before radii are looked up.
 """
@@ -225,7 +227,7 @@ def _radii(samples: Float64, ends: Sequence[float]) -> Float64:
     return np.minimum(radii, WIDEST)
 
 
-@inlined
+@compiled
 def _place(matrices: Float64, points: Points, point: int) -> tuple[float, float, float]:
     """Return where a point is."""
     j = points.joints[point]
@@ -238,7 +240,7 @@ def _place(matrices: Float64, points: Points, point: int) -> tuple[float, float,
     )
 
 
-@inlined
+@compiled
 def _depth(
     matrices: Float64, parts: Parts, part: int, place: tuple[float, float, float]
 ) -> tuple[float, float, float, float]:
@@ -309,10 +311,12 @@ def _find_turns(
     """Fill wanted (6,): turns of shoulder and wrist that move points by depths (P,) along a way (3,)."""
     normal, row = np.zeros((6, 6)), np.zeros(6)
     wanted[:] = 0.0
+    deepest = 0.0
     for point in range(len(depths)):
         depth = depths[point]
         if depth <= 0.0:
             continue
+        deepest = max(deepest, depth)
         place = _place(matrices, points, point)
         for k in range(2):
             x = place[0] - matrices[joints[k], 0, 3]
@@ -328,11 +332,13 @@ def _find_turns(
                 normal[i, k] += row[i] * row[k] * depth
     for i in range(6):
         damping = DAMPING[0] if i < 3 else DAMPING[1]
-        normal[i, i] += damping * damping * depths.max()
+        normal[i, i] += damping * damping * deepest
     _solve(normal, wanted)
     for k in range(2):
         turn = wanted[3 * k : 3 * k + 3]
-        turn /= 1.0 + np.sqrt((turn * turn).sum()) / LARGEST[k]
+        shorter = 1.0 + _length(turn) / LARGEST[k]
+        for i in range(3):
+            turn[i] /= shorter
 
 
 @compiled
@@ -345,24 +351,33 @@ def push_out(
     """
     moved = matrices.copy()  # goes all the way out; `matrices` a share of it where no way is sure
     depths, wanted = np.zeros(len(points.joints)), np.zeros(6)
-    now, first = np.zeros((2, 3)), np.zeros((2, 3))
+    now, first, way = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(3)
+    part = np.zeros(3)
     share, hold = 1.0, 0.0
     for step in range(STEPS):
         most = _measure(moved, parts, points, depths, now, side)
         if most <= 0.0:
             return
+        for i in range(3):
+            if step == 0:
+                first[0, i], first[1, i] = now[0, i], now[1, i]
+            way[i] = now[0, i] + now[1, i]
         if step == 0:
-            first[:] = now
-            share = _smoothstep(_length(now[0] + now[1]) / SURE)
+            share = _smoothstep(_length(way) / SURE)
             hold = _smoothstep(most / HELD)
-        way = now[0] * (1.0 - hold) + first[0] * hold + first[1]
-        way /= max(_length(way), 1e-9)
+        for i in range(3):
+            way[i] = now[0, i] * (1.0 - hold) + first[0, i] * hold + first[1, i]
+        long = max(_length(way), 1e-9)
+        for i in range(3):
+            way[i] /= long
         _find_turns(moved, (carried[0], hand[0]), points, depths, way, wanted)
         for k in range(2):
             turn, joints = wanted[3 * k : 3 * k + 3], carried if k == 0 else hand
             _turn(moved, joints, turn)
-            _turn(matrices, joints, turn * share)
-            turns[k] += turn * share
+            for i in range(3):
+                part[i] = turn[i] * share
+                turns[k, i] += part[i]
+            _turn(matrices, joints, part)
 
 
 @inlined
@@ -375,7 +390,7 @@ def _smoothstep(t: float) -> float:
 @inlined
 def _length(vector: Float64) -> float:
     """Return the length of a vector."""
-    return float(np.sqrt((vector * vector).sum()))
+    return float(np.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]))
 
 
 @inlined
@@ -399,7 +414,7 @@ def _turn(matrices: Float64, joints: Int64, turn: Float64) -> None:
     angle = _length(turn)
     if angle < 1e-12:
         return
-    x, y, z = turn / angle
+    x, y, z = turn[0] / angle, turn[1] / angle, turn[2] / angle
     sine, cosine = np.sin(angle), np.cos(angle)
     first = joints[0]
     px, py, pz = matrices[first, 0, 3], matrices[first, 1, 3], matrices[first, 2, 3]

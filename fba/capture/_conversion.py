@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fba.capture._skeleton import Captured, SkeletonOptions, retarget_motion
-from fba.capture.blendshapes import ActionUnitMotion, ShapeMotion, from_action_units, from_blendshapes
-from fba.capture.markers._faces import from_markers
-from fba.capture.markers._motion import MarkerMotion
 from fba.capture.motion import SkeletonMotion
-from fba.capture.points import PointMotion, from_points
 from fba.errors import warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 
-FaceCapture = ShapeMotion | ActionUnitMotion | MarkerMotion | PointMotion
-_FACES: Mapping[type[FaceCapture], Callable[..., Any]] = {
-    ShapeMotion: from_blendshapes,
-    ActionUnitMotion: from_action_units,
-    MarkerMotion: from_markers,
-    PointMotion: from_points,
-}
+if TYPE_CHECKING:
+    from fba.capture._faces import FaceCapture
+
 _MARKERS = ("rate", "markers", "neutral", "gaze", "head_path")
 _OPTIONS: Mapping[str, tuple[str, ...]] = {
     "skeleton": ("rate", *(field.name for field in fields(SkeletonOptions))),
@@ -61,4 +53,6 @@ def make_animation(
     with naming_file(path):
         if isinstance(capture, SkeletonMotion):
             return retarget_motion(capture, rate, SkeletonOptions(**options), limits=limits)
-        return Captured(_FACES[type(capture)](capture, rate, limits=limits, **options), capture)
+        from fba.capture._faces import CONVERSIONS  # a third of a second that a skeleton can do without
+
+        return Captured(CONVERSIONS[type(capture)](capture, rate, limits=limits, **options), capture)

@@ -3,7 +3,8 @@
 The first passes draw all triangles as the key light and the sky see them. Of the former they keep how high
 what it reaches first is: bodies are in the shade below that; of the latter how near the ground the lowest
 is. What is around each piece of ground comes from halved copies. The next pass finds the ground's darkness:
-the nearer what hides the light, the sharper. The last draws it.
+the nearer what hides the light, the sharper. The last draws it. Around the feet of few bodies both are done
+once more, finely: there shoes stand on the ground.
 """
 
 from __future__ import annotations
@@ -15,21 +16,29 @@ import numpy as np
 from fba.arrays import Float32, Int32, Intp, UInt8
 from fba.rotations import unit
 from fba_player._figure.face_light import KEY_DIRECTION
-from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniform, write_buffer
+from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniforms, write_buffer
 from fba_player.view._view import FaceMesh, FaceShape
 
 TEXELS = 256
 """Texels along each side of the maps that the sky and the key light see."""
 HALVINGS = 5
 """How often the maps are halved."""
-CELLS = 64
-"""Texels of the darkness along each side."""
+CELLS, NEAR_CELLS = 64, 48
+"""Texels of the darkness along each side, of all the ground and of that near feet."""
 FRAMED = 0.25
 """Metres: in steps of these, the map that the key light sees is larger than what throws shadows."""
-WIDTH = 4.8
+WIDTH = 4.0
 """Metres of ground, along each side, for one body."""
-COARSE = 2.0
+COARSE = 2.4
 """Shadows are cast coarsely on ground that is wider than this, in multiples of `WIDTH`."""
+CONTACT = 1.12
+"""Metres, along each side, of the ground that is looked at finely around feet; twice that in long steps."""
+BEYOND = 0.5
+"""Metres by which it is wider than the feet are apart, at least."""
+SKY_REACH, KEY_REACH = 1.1, 0.8
+"""Metres beyond what hides the sky, and beyond what hides the key light, up to which ground may be darker."""
+ALL = (0.0, 0.0, 1.0, 1.0)
+"""The whole ground: corner and size, as shares of it."""
 ACROSS = unit(np.array([KEY_DIRECTION[2], 0.0, -KEY_DIRECTION[0]]))
 BEFORE = np.stack([ACROSS, np.cross(unit(np.array(KEY_DIRECTION)), ACROSS)], axis=1).astype(np.float32)
 """(3, 2): axes of the map that the key light sees, as in shaders/lighting.glsl."""
@@ -54,20 +63,23 @@ class GroundShadow:
         self._gl = context
         self._heights = context.texture((TEXELS, TEXELS), 2, dtype="f2")
         self._tops = context.texture((TEXELS, TEXELS), 4, dtype="f4")
-        self._darkness = context.texture((CELLS, CELLS), 1, alignment=1)
-        self._darkness.filter = (context.LINEAR, context.LINEAR)
-        for texture in (self._heights, self._tops, self._darkness):
+        self._darkness, self._contact = (
+            context.texture((cells, cells), 1, alignment=1) for cells in (CELLS, NEAR_CELLS)
+        )
+        for texture in (self._heights, self._tops, self._darkness, self._contact):
             texture.repeat_x = texture.repeat_y = False
+            texture.filter = (context.LINEAR, context.LINEAR)
         self._seen = {map_: context.framebuffer([map_]) for map_ in (self._tops, self._heights)}
-        self._shaded = context.framebuffer([self._darkness])
+        self._shaded, self._near = (context.framebuffer([map_]) for map_ in (self._darkness, self._contact))
         self._shapes = RecentlyUsed[tuple[Intp, Int32]](CACHED_SHAPES, lambda _: None)
         self._thrown_parts: list[Any] = []
         self._thrown_shapes: list[tuple[FaceShape, bool]] = []
         self._square = context.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], dtype="f4").tobytes())
         self._programs = {name: load_program(context, name) for name in ("thrown", "shaded", "cast")}
+        self._programs["contact"] = load_program(context, "shaded", "CONTACT")
         self._arrays = {
             name: context.vertex_array(self._programs[name], [(self._square, "2f", "in_corner")])
-            for name in ("shaded", "cast")
+            for name in ("shaded", "contact", "cast")
         }
 
     def draw(self, meshes: list[FaceMesh], places: Float32, camera: bytes) -> Shade | None:
@@ -78,18 +90,39 @@ class GroundShadow:
         casting = [mesh for mesh in meshes if _casts(mesh)]
         if not casting:
             return None
-        gl, target, viewport = self._gl, self._gl.fbo, self._gl.viewport
+        target, viewport = self._gl.fbo, self._gl.viewport
         low, width = _ground_around(places)
-        frame = self._find(casting, low, width)
+        frame, part = self._find(casting, low, width)
         target.use()
-        gl.viewport = viewport
-        gl.enable_only(gl.BLEND)
-        gl.blend_func = gl.ZERO, gl.SRC_COLOR
-        self._darkness.use(0)
-        for name, value in (("camera", camera), ("low", low), ("width", width)):
-            set_uniform(self._programs["cast"], name, value)
-        self._arrays["cast"].render(gl.TRIANGLE_STRIP)
+        self._gl.viewport = viewport
+        self._cast(self._darkness, camera=camera, low=low, width=width, part=part)
+        corner, size = _ground_near(places)
+        if size <= 2 * CONTACT:
+            self._darkness.use(3)
+            self._shade(
+                "contact", self._near, frame=frame, low=low, width=width, corner=corner, size=size, darkness=3
+            )
+            target.use()
+            self._gl.viewport = viewport
+            self._cast(self._contact, camera=camera, low=corner, width=size, part=ALL)
         return Shade(self._tops, frame)
+
+    def _cast(self, map_: Any, **values: object) -> None:
+        """Darken the ground of the bound framebuffer by a map. values: of uniforms."""
+        gl, contact = self._gl, map_ is self._contact
+        gl.enable_only(gl.BLEND)
+        gl.blend_func = gl.DST_COLOR if contact else gl.ZERO, gl.SRC_COLOR
+        map_.use(2)
+        set_uniforms(self._programs["cast"], darkness=2, contact=float(contact), **values)
+        self._arrays["cast"].render(gl.TRIANGLE_STRIP)
+
+    def _shade(self, name: str, map_: Any, **values: object) -> None:
+        """Fill a map of darkness by one of the programs. values: of uniforms."""
+        map_.use()
+        self._gl.enable_only(self._gl.NOTHING)
+        self._gl.viewport = (0, 0, *map_.size)
+        set_uniforms(self._programs[name], tops=1, **values)
+        self._arrays[name].render(self._gl.TRIANGLE_STRIP)
 
     def darkness(self, meshes: list[FaceMesh], places: Float32) -> UInt8:
         """Return uint8 (CELLS, CELLS): the darkness of the ground that `draw` draws, rows along z."""
@@ -98,16 +131,19 @@ class GroundShadow:
 
     def _find(
         self, casting: list[FaceMesh], low: tuple[float, float], width: float
-    ) -> tuple[float, float, float]:
-        """Find the darkness of the ground from `low` on, and return the frame of the key light's map."""
+    ) -> tuple[tuple[float, float, float], tuple[float, ...]]:
+        """Find the darkness of the ground from `low` on.
+
+        Returns the frame of the key light's map, and the part of the ground outside which there is no shadow.
+        """
         import moderngl
 
-        gl = self._gl
-        thrown, shaded = self._programs["thrown"], self._programs["shaded"]
-        frame = self._place(casting, width > COARSE * WIDTH) if casting else (0.0, 0.0, 1.0)
-        for program in (thrown, shaded):
-            for name, value in (("low", low), ("width", width), ("frame", frame)):
-                set_uniform(program, name, value)
+        gl, thrown = self._gl, self._programs["thrown"]
+        frame, part = (0.0, 0.0, 1.0), ALL
+        if casting:
+            points = self._place(casting, width > COARSE * WIDTH)
+            frame, part = _frame_around(points), _dark_part(points, low, width)
+        set_uniforms(thrown, low=low, width=width, frame=frame)
         gl.enable_only(gl.BLEND)
         gl.blend_func = gl.ONE, gl.ONE
         gl.blend_equation = moderngl.MAX
@@ -115,22 +151,22 @@ class GroundShadow:
             framebuffer.use()
             gl.viewport = (0, 0, TEXELS, TEXELS)
             gl.clear(0.0, 0.0, 0.0, 0.0)
-            set_uniform(thrown, "sky", float(sky))
+            set_uniforms(thrown, sky=float(sky))
             if casting:
                 self._thrown_parts[0].render()
             texture.build_mipmaps(0, HALVINGS)
             texture.filter = (gl.LINEAR_MIPMAP_NEAREST, gl.LINEAR)
             texture.use(1 - sky)
         gl.blend_equation = moderngl.FUNC_ADD
-        gl.enable_only(gl.NOTHING)
         self._shaded.use()
-        gl.viewport = (0, 0, CELLS, CELLS)
-        set_uniform(shaded, "tops", 1)
-        self._arrays["shaded"].render(gl.TRIANGLE_STRIP)
-        return frame
+        gl.clear()
+        self._shaded.scissor = tuple(round(CELLS * share) for share in part)
+        self._shade("shaded", self._shaded, frame=frame, low=low, width=width)
+        self._shaded.scissor = None
+        return frame, part
 
-    def _place(self, casting: list[FaceMesh], coarsely: bool) -> tuple[float, float, float]:
-        """Write the places of all vertices, and return the frame of the map that the key light sees.
+    def _place(self, casting: list[FaceMesh], coarsely: bool) -> Float32:
+        """Write the places (N, 3) of all vertices, and return them.
 
         coarsely: whether few triangles do, as each body covers little of the maps.
         All triangles are drawn at once: software OpenGL takes longer to begin a part than to draw it.
@@ -146,7 +182,7 @@ class GroundShadow:
         ]
         points = np.concatenate(places)
         write_buffer(self._thrown_parts[1], points)
-        return _frame_around(points)
+        return points
 
     def _join(self, shapes: list[tuple[FaceShape, bool]], parts: list[tuple[Intp, Int32]]) -> None:
         """Make the buffers for the casting vertices of all shapes, one after the other."""
@@ -163,7 +199,8 @@ class GroundShadow:
     def close(self) -> None:
         for part in (
             *self._thrown_parts, *self._arrays.values(), *self._programs.values(), self._square,
-            *self._seen.values(), self._shaded, self._heights, self._tops, self._darkness,
+            *self._seen.values(), self._shaded, self._near, self._heights, self._tops, self._darkness,
+            self._contact,
         ):  # fmt: skip
             part.release()
 
@@ -172,7 +209,7 @@ def _casting(shape: FaceShape, coarsely: bool) -> tuple[Intp, Int32]:
     """Return the vertices (N,) of the triangles that cast a shape's shadow, and these triangles of them."""
     triangles = shape.triangles if shape.outer is None else shape.outer
     if coarsely and shape.outermost is not None:
-        triangles = shape.outermost
+        triangles = shape.outermost()
     rows, corners = np.unique(triangles, return_inverse=True)
     return rows.astype(np.intp), corners.reshape(-1, 3).astype(np.int32)
 
@@ -192,6 +229,17 @@ def _frame_around(points: Float32) -> tuple[float, float, float]:
     return float(u), float(v), 1 / width
 
 
+def _dark_part(points: Float32, low: tuple[float, float], width: float) -> tuple[float, ...]:
+    """Return where points (N, 3) may darken the ground: corner and size, 0..1, in whole cells."""
+    below = points[:, ::2]
+    thrown = below - np.array(KEY_DIRECTION[::2], dtype=np.float32) / KEY_DIRECTION[1] * points[:, 1:2]
+    least = np.minimum(below.min(axis=0) - SKY_REACH, thrown.min(axis=0) - KEY_REACH)
+    most = np.maximum(below.max(axis=0) + SKY_REACH, thrown.max(axis=0) + KEY_REACH)
+    first, last = (np.clip((end - low) * CELLS / width, 0, CELLS) for end in (least, most))
+    first, last = np.floor(first) / CELLS, np.ceil(last) / CELLS
+    return (*first.tolist(), *(last - first).tolist())
+
+
 def _ground_around(places: Float32) -> tuple[tuple[float, float], float]:
     """Return the corner (x, z) and the width (m) of the square of ground on which shadows fall."""
     least, most = places.min(axis=0), places.max(axis=0)
@@ -200,3 +248,11 @@ def _ground_around(places: Float32) -> tuple[tuple[float, float], float]:
     corner = (least + most) / 2 - ahead * np.array(KEY_DIRECTION[::2]) - width / 2
     x, z = np.floor(corner * CELLS / width) * width / CELLS  # whole texels: the shadow does not shimmer
     return (float(x), float(z)), width
+
+
+def _ground_near(places: Float32) -> tuple[tuple[float, float], float]:
+    """Return corner and width, as of `_ground_around`, of the square in which feet touch the ground."""
+    least, most = places.min(axis=0), places.max(axis=0)
+    size = CONTACT * max(float(np.ceil(((most - least).max() + BEYOND) / CONTACT)), 1.0)
+    x, z = np.floor(((least + most) / 2 - size / 2) * NEAR_CELLS / size) * size / NEAR_CELLS
+    return (float(x), float(z)), size

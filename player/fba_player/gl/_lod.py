@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -178,7 +179,7 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
         outer = number[outer]
         outer = np.ascontiguousarray(outer) if outer.min(initial=0) >= 0 else None
     if outer is not None and shape.coarser is not None:
-        outermost = _close_and_simplify(shape.coarser.points[rows, :3], outer)
+        outermost = partial(_close_and_simplify, shape.coarser.points[rows, :3], outer)
     coarser = replace(
         shape,
         outer=outer,

@@ -46,6 +46,12 @@ def set_uniform(program: Any, name: str, value: Any) -> None:
         member.value = value
 
 
+def set_uniforms(program: Any, **values: Any) -> None:
+    """Set uniforms of a program by name, as `set_uniform` does."""
+    for name, value in values.items():
+        set_uniform(program, name, value)
+
+
 def matrix_bytes(matrix: Array) -> bytes:
     """Return a matrix as OpenGL stores it: float32, column by column."""
     return np.ascontiguousarray(matrix.T, dtype="f4").tobytes()

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from fba.body import BapSolver, Skeleton, convention_names
 from fba.body.solve._pose_loops import arc_tangent, sine_cosine
 from fba.body.solve.conventions import convention
+from fba.compiled import compiled
 from fba.parameters import bap_numbers, baps
 
 NUMBERS = bap_numbers()
@@ -122,9 +123,19 @@ def test_frames_one_by_one_are_frames_together() -> None:
         assert np.abs(row - together[number]).max() <= 1
 
 
+@compiled
+def sine_cosine_of(angle: float) -> tuple[float, float]:
+    return sine_cosine(angle)
+
+
+@compiled
+def arc_tangent_of(y: float, x: float) -> float:
+    return arc_tangent(y, x)
+
+
 @given(st.floats(-21475.0, 21475.0))
 def test_sine_and_cosine(angle: float) -> None:
-    sine, cosine = sine_cosine(angle)
+    sine, cosine = sine_cosine_of(angle)
     assert sine == pytest.approx(math.sin(angle), abs=3e-16)
     assert cosine == pytest.approx(math.cos(angle), abs=3e-16)
 
@@ -132,7 +143,7 @@ def test_sine_and_cosine(angle: float) -> None:
 @given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_arc_tangent(y: float, x: float) -> None:
     assume(max(abs(x), abs(y)) > 1e-300)
-    found = arc_tangent(y, x)
+    found = arc_tangent_of(y, x)
     difference = math.remainder(found - math.atan2(y, x), 2 * math.pi)
     assert abs(difference) < 2e-11
     assert abs(found) <= math.pi

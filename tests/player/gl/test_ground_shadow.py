@@ -82,3 +82,29 @@ def test_a_shadow_is_reproducible_and_nothing_casts_no_shadow(context: Any) -> N
     mesh = ball(0.25, (0.3, 0.7, -0.2))
     np.testing.assert_array_equal(Ground(context, mesh).darkness, Ground(context, mesh).darkness)
     assert not Ground(context).darkness.any()
+
+
+def test_what_stands_on_the_ground_is_dark_at_its_foot_alone(context: Any) -> None:
+    """Seen from above, 1 cm a pixel: near feet the ground is drawn more finely than its map of darkness."""
+    size = 200
+    target = context.simple_framebuffer((size, size))
+    from_above = np.zeros((4, 4), dtype=np.float32)
+    from_above[0, 0] = from_above[1, 2] = from_above[3, 3] = 1.0  # x and z, a metre to each side
+    rows = []
+    for height in (0.04, 0.2):
+        target.use()
+        target.clear(1.0, 1.0, 1.0, 1.0)
+        shadow = GroundShadow(context)
+        assert shadow.draw(
+            [ball(0.05, (0.0, height, 0.0))], np.zeros((3, 2), np.float32), from_above.T.tobytes()
+        )
+        shadow.close()
+        seen = np.frombuffer(target.read(components=1, alignment=1), np.uint8).reshape(size, size).astype(int)
+        rows.append(seen[size // 2])
+        assert np.abs(np.diff(seen[:, : size // 4])).max() <= 2  # nothing to see at edges of maps
+    target.release()
+    touching, raised = rows
+    middle = size // 2
+    assert touching[middle] < 0.35 * 255
+    assert touching[middle] < raised[middle] - 60
+    assert touching[middle + 12] > 0.85 * 255  # 12 cm away, on the side of the light

@@ -1,8 +1,10 @@
 #version 330 core
 uniform sampler2D darkness;
+uniform float contact;   // 1: the map holds half of what the ground's light is multiplied by
 in vec2 at;
 out vec4 pixel;
 
 void main() {
-    pixel = vec4(vec3(1.0 - texture(darkness, at).r), 1.0);  // what it leaves of the ground's light
+    float seen = texture(darkness, at).r;
+    pixel = vec4(vec3(mix(1.0 - seen, seen, contact)), 1.0);  // what is left of the ground's light, or half
 }

@@ -112,9 +112,17 @@ vec3 diffuse(vec3 n, vec3 albedo, vec4 reach, float scatter) {
     // In folds, light is reflected again, and red light passes through flesh.
     vec3 open = reach.y * (1.0 + (1.0 - reach.y) * 0.85 * albedo);
     open += (1.0 - reach.y) * vec3(0.24, 0.10, 0.085) * scatter;
-    vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0) + BACK * max(dot(n, BACK_DIRECTION), 0.0);
+    vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0);
     dome += mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62;
     float rim = max(dot(n, RIM_DIRECTION), 0.0) * reach.w;
+#ifdef LIMBS
+    // Clothes of a body get more of the key light and of that from behind, and less of the rest: folds show.
+    float cloth = 1.0 - scatter;
+    key *= 1.0 + cloth * (0.22 - 0.6 * (1.0 - reach.y));
+    dome *= 1.0 - 0.38 * cloth;
+    rim *= 1.0 + 1.6 * cloth;
+#endif
+    dome += BACK * max(dot(n, BACK_DIRECTION), 0.0);
     return KEY * key + dome * open + RIM * (rim + vec3(1.5, 0.32, 0.16) * (reach.z * scatter));
 }
 
