@@ -37,7 +37,7 @@ BEYOND = 0.5
 """Metres by which it is wider than the feet are apart, at least."""
 SKY_REACH, KEY_REACH = 1.1, 0.8
 """Metres beyond what hides the sky, and beyond what hides the key light, up to which ground may be darker."""
-ALL = (0.0, 0.0, 1.0, 1.0)
+ALL: tuple[float, ...] = (0.0, 0.0, 1.0, 1.0)
 """The whole ground: corner and size, as shares of it."""
 ACROSS = unit(np.array([KEY_DIRECTION[2], 0.0, -KEY_DIRECTION[0]]))
 BEFORE = np.stack([ACROSS, np.cross(unit(np.array(KEY_DIRECTION)), ACROSS)], axis=1).astype(np.float32)
