@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 from PIL import Image, ImageDraw
-from scipy.ndimage import binary_dilation, gaussian_filter
+from scipy.ndimage import gaussian_filter, maximum_filter
 
 from fba import Animation, FaceTrack, player
 from fba.arrays import Float64, UInt8
@@ -42,6 +42,8 @@ HAIR = 120
 """Red of the built-in skin's picture below which it is hair."""
 STRANDS = 3.0
 """Pixels over which that is blurred: bright strands are hair, too."""
+AROUND_BROWS = (35, 101)
+"""Height and width, pixels, of what goes with each dark pixel of a brow: its tips are thin and pale."""
 
 
 def rendered_faces(count: int, seed: int) -> Iterator[tuple[UInt8, Float64]]:
@@ -107,7 +109,7 @@ def _coloured(part: Part, random: np.random.Generator, with_brows: bool) -> Part
     if with_brows:
         result[brows] = strength * painted[brows] + (1 - strength) * (mean * tone)
     else:
-        gone = gaussian_filter(binary_dilation(brows, iterations=8).astype(np.float64), 3)[..., None]
+        gone = gaussian_filter(maximum_filter(brows, AROUND_BROWS).astype(np.float64), 3)[..., None]
         result += gone * (mean * tone - result)
     file = io.BytesIO()
     Image.fromarray(np.clip(result, 0, 255).astype(np.uint8)).save(file, "JPEG", quality=90)
@@ -152,7 +154,7 @@ def _paint_brows(face: Float64, places: Float64, random: np.random.Generator) ->
     eyes = float(np.linalg.norm(places[row["3.5"]] - places[row["3.6"]]))
     down = np.array([0.0, eyes])
     wide = random.uniform(0.06, 0.22) * eyes
-    moves = random.normal(0, (0.06, 0.04, 0.05, 0.05))  # of all, of each point more
+    moves = random.normal(0, (0.06, 0.04, 0.07, 0.07))  # of all, of each point more
     colour = random.uniform(0, 1.0) ** 2 * 170 * (1 + 0.2 * random.standard_normal(3))
     strength, blur = random.uniform(0.4, 1.0), random.uniform(0.4, 1.6)
     grain = np.clip(1 + random.uniform(0, 0.5) * _cloud(random, 1.0), 0, 1.2)
@@ -162,7 +164,7 @@ def _paint_brows(face: Float64, places: Float64, random: np.random.Generator) ->
         own = random.normal(0, 0.015, (3, 2)) * eyes
         inner, top, tip = places[rows] + (moves[0] + moves[1:, None]) * down + own
         along = np.linspace(0, 1, 24)[:, None]
-        shift = random.uniform(0.4, 0.65)  # where along the brow it is highest
+        shift = random.uniform(0.4, 0.8)  # where along the brow it is highest
         bend = inner + (tip - inner) * shift
         top = np.array([bend[0], min(top[1], inner[1] - 0.01 * eyes, tip[1] - 0.01 * eyes)])
         lift = top - bend
