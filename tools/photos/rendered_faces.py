@@ -154,7 +154,7 @@ def _paint_brows(face: Float64, places: Float64, random: np.random.Generator) ->
     eyes = float(np.linalg.norm(places[row["3.5"]] - places[row["3.6"]]))
     down = np.array([0.0, eyes])
     wide = random.uniform(0.06, 0.22) * eyes
-    moves = random.normal(0, (0.06, 0.04, 0.07, 0.07))  # of all, of each point more
+    moves = random.normal(0, (0.06, 0.04, 0.05, 0.05))  # of all, of each point more
     colour = random.uniform(0, 1.0) ** 2 * 170 * (1 + 0.2 * random.standard_normal(3))
     strength, blur = random.uniform(0.4, 1.0), random.uniform(0.4, 1.6)
     grain = np.clip(1 + random.uniform(0, 0.5) * _cloud(random, 1.0), 0, 1.2)
@@ -164,7 +164,7 @@ def _paint_brows(face: Float64, places: Float64, random: np.random.Generator) ->
         own = random.normal(0, 0.015, (3, 2)) * eyes
         inner, top, tip = places[rows] + (moves[0] + moves[1:, None]) * down + own
         along = np.linspace(0, 1, 24)[:, None]
-        shift = random.uniform(0.4, 0.8)  # where along the brow it is highest
+        shift = random.uniform(0.4, 0.65)  # where along the brow it is highest
         bend = inner + (tip - inner) * shift
         top = np.array([bend[0], min(top[1], inner[1] - 0.01 * eyes, tip[1] - 0.01 * eyes)])
         lift = top - bend
