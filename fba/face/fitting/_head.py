@@ -143,7 +143,7 @@ def _with_brows(points: Float64, usual: Float64) -> Float64:
     That face is laid on the other points; otherwise brows would follow the lids, however far these stand out.
     """
     brows = [point_rows()[name] for side in BROWS for name in side]
-    known = np.isfinite(points).all(axis=1) & np.isfinite(usual).all(axis=1)
+    known = np.asarray(np.isfinite(points + usual).all(axis=1))
     if known[brows].any():
         return points
     result = points.copy()
