@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 from PIL import Image, ImageDraw
-from scipy.ndimage import binary_dilation, gaussian_filter
+from scipy.ndimage import gaussian_filter, maximum_filter
 
 from fba import Animation, FaceTrack, player
 from fba.arrays import Float64, UInt8
@@ -42,6 +42,8 @@ HAIR = 120
 """Red of the built-in skin's picture below which it is hair."""
 STRANDS = 3.0
 """Pixels over which that is blurred: bright strands are hair, too."""
+AROUND_BROWS = (35, 101)
+"""Height and width, pixels, of what goes with each dark pixel of a brow: its tips are thin and pale."""
 
 
 def rendered_faces(count: int, seed: int) -> Iterator[tuple[UInt8, Float64]]:
@@ -107,7 +109,7 @@ def _coloured(part: Part, random: np.random.Generator, with_brows: bool) -> Part
     if with_brows:
         result[brows] = strength * painted[brows] + (1 - strength) * (mean * tone)
     else:
-        gone = gaussian_filter(binary_dilation(brows, iterations=8).astype(np.float64), 3)[..., None]
+        gone = gaussian_filter(maximum_filter(brows, AROUND_BROWS).astype(np.float64), 3)[..., None]
         result += gone * (mean * tone - result)
     file = io.BytesIO()
     Image.fromarray(np.clip(result, 0, 255).astype(np.uint8)).save(file, "JPEG", quality=90)

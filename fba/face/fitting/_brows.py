@@ -1,23 +1,31 @@
-"""Brows followed as dark ridges near where they were found: their ends, and the top of their upper edge."""
+"""Brows followed as dark ridges above the lids: their ends, and the top of their upper edge."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, gaussian_filter1d, map_coordinates
+from scipy.special import expit
 
 from fba.arrays import Float64, Intp
+from fba.face.fitting._features import features
 from fba.face.fitting._points_file import FRONT_POINTS
 
 BROWS = (("4.1", "4.3", "4.5"), ("4.2", "4.4", "4.6"))
 """Inner end, highest point and outer end of each brow."""
-TRUST = np.array([0.25, 0.5, 0.25])[:, None]
-"""How far these three go to what the ridge shows; chosen on rendered heads from which nothing was learned."""
+EYES = (("3.5", "3.1"), ("3.6", "3.2"))
+"""Pupil and upper lid below each brow."""
+TRUST = np.array([[0.2, 0.3], [0.4, 0.2], [0.1, 0.4]])
+"""How far these three go sideways and up to what the ridge shows; chosen on rendered heads from which nothing
+was learned, like `SPREAD` and `LASHES`."""
 COLUMNS, BEYOND = 40, 0.15
 """Columns that are looked at, and shares of the brow's length beyond its ends."""
-UP, DOWN = 12, 23
-"""Pixels of a face of standard size above and below the brow that was found."""
-USUAL, SPREAD = 4.0, 9.0
-"""Pixels below the found points where the ridge usually is, and by which that differs."""
+UP, DOWN = 16, 23
+"""Pixels of a face of standard size above and below the middle between the brow that was found and the usual
+one above the pupil."""
+USUAL, SPREAD = 4.0, 7.0
+"""Pixels below that line where the ridge usually is, and by which that differs."""
+LASHES = 4.0
+"""Pixels above the upper lid up to which dark is lashes or a fold."""
 STEP = 0.06
 """What a pixel up or down from column to column costs, in shares of the strongest ridge."""
 FAINT = 0.4
@@ -28,14 +36,16 @@ LEAST = 12
 
 def follow_brows(face: Float64, places: Float64) -> Float64:
     """Return points (P, 2) in a face of standard size, those of the brows moved towards what it shows."""
-    result, smooth = places.copy(), gaussian_filter(face, 1.0)
-    for names in BROWS:
+    result, smooth, mean = places.copy(), gaussian_filter(face, 1.0), features().mean
+    for names, eye in zip(BROWS, EYES, strict=True):
         rows = [FRONT_POINTS.index(name) for name in names]
-        line = _line(*places[rows])
+        pupil, lid = (FRONT_POINTS.index(name) for name in eye)
+        line = _line(*(places[rows] + mean[rows] - mean[pupil] + places[pupil]) / 2)
         down = np.arange(-UP, DOWN)
-        x = np.repeat(line[:, :1], len(down), axis=1)
-        strip = map_coordinates(smooth, [line[:, 1:] + down, x], order=1, mode="nearest")
+        x, y = np.broadcast_arrays(line[:, :1], line[:, 1:] + down)
+        strip = map_coordinates(smooth, [y, x], order=1, mode="nearest")
         ridge = np.maximum(gaussian_filter1d(strip, 2.0, axis=1, order=2), 0)
+        ridge *= expit(places[lid, 1] - LASHES - y)
         ridge = gaussian_filter1d(ridge, 1.5, axis=0) * np.exp(-(((down - USUAL) / SPREAD) ** 2) / 2)
         path = _strongest_path(ridge / (ridge.max() + 1e-9))
         strength = ridge[np.arange(COLUMNS), path]

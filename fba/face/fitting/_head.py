@@ -7,16 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fba.arrays import Float64
 from fba.errors import ModelError, warn
 from fba.face import FaceModel
 from fba.face.calibration import fit
 from fba.face.feature_points import MIRRORED
 from fba.face.fitting._average import with_average_forms
+from fba.face.fitting._brows import BROWS
 from fba.face.fitting._measures import Measure, measure
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS, HIDDEN, SIDE_POINTS, Points, check_inside
 from fba.face.fitting._skin import paint
 from fba.face.fitting._views import Observation, View, first_view, fit_views, solve
+from fba.geometry import fit_similarity
 from fba.parameters import point_rows
 
 DISTANCE = 1.5
@@ -128,9 +131,24 @@ def fit_head(
     apart = float(np.linalg.norm(points[row["3.5"]] - points[row["3.6"]]))
     usual = float(np.linalg.norm(base.points[row["3.5"]] - base.points[row["3.6"]]))
     points *= (usual if eyes is None else eyes) / apart
-    model = fit(with_average_forms(base), points, unit="m", name=name)
+    usual_face = with_average_forms(base)
+    model = fit(usual_face, _with_brows(points, usual_face.points), unit="m", name=name)
     views = fit_views(model.points, views, seen)
     return model, views, seen
+
+
+def _with_brows(points: Float64, usual: Float64) -> Float64:
+    """Return points (84, 3) with brows that no photograph shows where those of a usual face (84, 3) are.
+
+    That face is laid on the other points; otherwise brows would follow the lids, however far these stand out.
+    """
+    brows = [point_rows()[name] for side in BROWS for name in side]
+    known = np.asarray(np.isfinite(points + usual).all(axis=1))
+    if known[brows].any():
+        return points
+    result = points.copy()
+    result[brows] = fit_similarity(usual[known], points[known]).apply(usual[brows])
+    return result
 
 
 def template_points(photograph: Photograph, view: str) -> dict[str, tuple[float, float]]:

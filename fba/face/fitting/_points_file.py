@@ -31,7 +31,7 @@ FRONT_POINTS = (
 """The points that a frontal photograph shows, those first that a face cannot do without."""
 SIDE_POINTS = (
     "9.3", "9.15", "8.1", "8.2", "2.2", "2.10", "2.1", "9.12", "3.5", "3.7", "8.3", "11.1", "2.13", "10.9",
-    "10.5", "11.4", "11.6", "4.1", "4.3", "4.5", "9.1", "3.1", "3.3",
+    "10.5", "11.4", "11.6", "4.1", "4.3", "4.5", "9.1", "3.1", "3.3", "8.5", "8.7",
 )  # fmt: skip
 """The points that a profile shows, by the names of the subject's left side whichever side is seen."""
 HIDDEN = ("6.1", "6.2", "6.3", "6.4", "7.1", "9.8", "9.9", "9.10", "9.11", *FREE_POINTS)

@@ -7,6 +7,7 @@ import pytest
 
 from fba.arrays import Float64
 from fba.face import FaceModel
+from fba.face.feature_points import MIRRORED
 from fba.face.fitting import FRONT_POINTS, SIDE_POINTS
 from fba.face.fitting._views import (
     Observation,
@@ -82,8 +83,7 @@ def test_a_view_of_a_known_head_is_exact(yaw: float, pitch: float) -> None:
 def test_two_views_show_a_head_s_depth(side: float) -> None:
     points = other_head(4)
     true = [camera(7, 4), camera(side * 82, -3)]
-    right = {"3.5": "3.6", "3.7": "3.12", "8.3": "8.4", "2.13": "2.14", "10.9": "10.10", "10.5": "10.6"}
-    names = SIDE_POINTS if side > 0 else tuple(right.get(name, name) for name in SIDE_POINTS)
+    names = SIDE_POINTS if side > 0 else tuple(MIRRORED.get(name, name) for name in SIDE_POINTS)
     seen = [observe(true[0], points, FRONT_POINTS), observe(true[1], points, names)]
     first = [first_view(BASE, seen[0], 1.5), first_view(BASE, seen[1], 1.5, side=side)]
     found, views = solve(BASE, fit_views(BASE, first, seen), seen)
