@@ -69,9 +69,16 @@ def lowest_edge(
     for joint, own in _edge_points(tuple(edge), side):
         position, frame = frames[joint]
         height = skeleton.centres[skeleton.number(joint), 1]
-        up = frame[..., 1, :]
-        heights.append(position[:, 1] - up[..., 1] * height + (up @ own).min(axis=-1))
+        heights.append(_lowest_point(position[:, 1], frame[..., 1, :], height, own))
     return np.asarray(np.min(heights, axis=0))
+
+
+def _lowest_point(heights: Float64, up: Float64, height: float, own: Float64) -> Float64:
+    """Return the height (T,) of the lowest of a joint's points, float64 (3, N).
+
+    heights: (T,), of the joint; up: (T, 3), the vertical in its frame; height: in the default posture.
+    """
+    return np.asarray(heights - up[..., 1] * height + (up @ own).min(axis=-1))
 
 
 @cache
@@ -89,7 +96,11 @@ def lowest_sole(skeleton: Skeleton, matrices: Float64) -> Float64 | None:
     """Return the height (T,) of the lower sole in poses (T, J, 4, 4); None for a skeleton without feet."""
     if not has_feet(skeleton):
         return None
-    lows = [lowest_edge(skeleton, foot_frames(skeleton, matrices, side), side, SOLE) for side in SIDES]
+    lows = []
+    for joint, own in (points for side in SIDES for points in _edge_points(SOLE, side)):
+        number = skeleton.number(joint)
+        vertical = matrices[:, number, 1]
+        lows.append(_lowest_point(vertical[:, 3], vertical[:, :3], skeleton.centres[number, 1], own))
     return np.asarray(np.min(lows, axis=0))
 
 

@@ -7,7 +7,7 @@ from bisect import bisect_right
 
 import numpy as np
 
-from fba.arrays import Bool, Float32, Int32
+from fba.arrays import Bool, Int32
 from fba.mesh.simplify import TOLERANCES
 from fba_player._figure._face_parts import join_pieces
 from fba_player.view._view import FaceShape
@@ -28,7 +28,7 @@ SAMPLED_VERTICES = 24
 def choose_level(shape: FaceShape, pixel: float) -> int:
     """Return the number of a part's level of detail, 0 for all triangles, where a pixel is so wide (m)."""
     if shape.across is not None:  # locks of hair lie over each other: fewer would show the skin
-        return _halvings(shape.across, pixel) if shape.kind == "lash" else 0
+        return _halvings(shape, pixel) if shape.kind == "lash" else 0
     if shape.coarser is not None:
         return bisect_right(TOLERANCES, MAX_ERROR_PIXELS * pixel)
     return bisect_right([level.error for level in shape.levels], MAX_FACE_ERROR_PIXELS * pixel)
@@ -60,9 +60,9 @@ def sampled(count: int) -> slice:
     return slice(None, None, max(count // SAMPLED_VERTICES, 1))
 
 
-def _halvings(across: Float32, pixel: float) -> int:
-    """Return how often the number of hairs (`FaceShape.across`) is halved where a pixel is so wide (m)."""
-    narrow = FAINTEST_HAIR * PIXELS_OF_HAIR * pixel / max(float(across[:, 3].max()), 1e-9)
+def _halvings(shape: FaceShape, pixel: float) -> int:
+    """Return how often the number of a part's hairs is halved where a pixel is so wide (m)."""
+    narrow = FAINTEST_HAIR * PIXELS_OF_HAIR * pixel / max(shape.hair_width, 1e-9)
     return min(int(math.log2(max(narrow, 1.0))), MOST_HALVINGS)
 
 

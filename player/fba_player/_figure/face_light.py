@@ -296,8 +296,9 @@ def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, wi
 
 def _lights(*turns: Float64) -> Float32:
     """Return float32 (N, 2, 16): weights of the harmonics for key and rim light under N rotations (3, 3)."""
-    towards = [LIGHTS @ turned.T for turned in turns]
-    return np.array([weights(at / np.linalg.norm(at, axis=1)[:, None]) for at in towards], dtype=np.float32)
+    towards = np.concatenate([LIGHTS @ turned.T for turned in turns])
+    towards /= np.linalg.norm(towards, axis=1)[:, None]
+    return weights(towards).reshape(len(turns), len(LIGHTS), -1).astype(np.float32)
 
 
 def _reaching(visibility: Float32, lights: Float32) -> Float32:

@@ -40,6 +40,8 @@ NEARER = 1.5
 """A face's levels of detail are at hand this many times nearer than they are drawn: they change gradually."""
 MOST_MOVERS = 8
 """How many choices of vertices are kept, a few megabytes each."""
+WITHIN_LIPS, SHUT_PIXELS = ("teeth", "tongue"), 0.5
+"""Kinds of a face's parts that are left out where its lips are less than so many pixels apart."""
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
@@ -123,11 +125,23 @@ class Person:
         movers.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
         light = self.figure.shade(faps, self.frame(joints), movers.light)
         wrinkles = wrinkle_strengths(faps)
+        shut = self._has_shut_lips(pose.positions, joints, seen)
         for name, shape in self.face_shapes.items():
+            if shut and shape.kind in WITHIN_LIPS:
+                continue
             rows = self.figure.rows(name)
             more = {"wrinkles": wrinkles, "finest": movers.finest}
             meshes.append(_mesh_in_world(shape, rows, positions, normals, light, **more))
         return meshes
+
+    def _has_shut_lips(self, positions: Float32, joints: Float64, seen: Seen | None) -> bool:
+        """Return whether nothing is seen between the lips of a face (V, 3) from there."""
+        lips = self.figure.light.lips
+        if seen is None or not lips:
+            return False
+        away = np.linalg.norm(joints[skull_of(self.body), :3, 3] - seen.eye)
+        apart = np.linalg.norm(positions[lips[0]] - positions[lips[1]])
+        return bool(apart < SHUT_PIXELS * seen.pixel * away)
 
     def _choose_movers(self, joints: Float64, seen: Seen | None) -> Movers:
         """Return what moves the vertices of all levels of detail that may be drawn from there."""

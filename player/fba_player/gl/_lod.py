@@ -238,13 +238,25 @@ def _add_means(values: Float32, rows: Int32, weights: Float32, means: Float32) -
 
 def distance(mesh: FaceMesh, eye: Float64) -> float:
     """Return the distance from an eye (3,) to the nearest of some vertices, in the mesh's own unit."""
-    sample = mesh.positions[sampled(len(mesh.positions))]
-    squared = float(mesh.matrix[:3, 0] @ mesh.matrix[:3, 0])  # of the scale
-    if not squared > 0:
-        return 0.0
-    away = sample - (eye - mesh.matrix[:3, 3]) @ mesh.matrix[:3, :3] / squared
-    least = float(np.einsum("ij,ij->i", away, away).min(initial=np.inf))
-    return math.sqrt(least) if math.isfinite(least) else 0.0
+    return math.sqrt(_least_square(mesh.positions, sampled(len(mesh.positions)).step, eye, mesh.matrix))
+
+
+@compiled
+def _least_square(positions: Float32, step: int, eye: Float64, matrix: Float64) -> float:
+    """Return the square of the least distance from an eye (3,) to every `step`th position (N, 3), in the unit
+    of these; 0 if none is finite. matrix: (4, 4), theirs into the world: rotation, shift and scale."""
+    seen, squared, least = np.zeros(3), 0.0, np.inf
+    for row in range(3):
+        squared += matrix[row, 0] * matrix[row, 0]  # of the scale
+        for axis in range(3):
+            seen[axis] += (eye[row] - matrix[row, 3]) * matrix[row, axis]
+    for i in range(0, len(positions) if squared > 0.0 else 0, step):
+        square = 0.0
+        for axis in range(3):
+            away = positions[i, axis] - seen[axis] / squared
+            square += away * away
+        least = min(least, square)
+    return least if np.isfinite(least) else 0.0
 
 
 def share_memory(one: Float32, other: Float32) -> bool:

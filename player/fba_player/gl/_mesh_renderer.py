@@ -63,6 +63,8 @@ class FaceRenderer:
         if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
             for program in self._programs.values():
                 self._set_camera(program)
+        if shade is not None:
+            shade.tops.use(3)
 
     def draw_opaque(self, meshes: list[FaceMesh]) -> None:
         """Draw the parts that are not transparent."""
@@ -73,6 +75,7 @@ class FaceRenderer:
                 # Software OpenGL collects triangles until another framebuffer is used, then fills pixels in
                 # threads of its own, while this one draws on. It slows down with what it has collected.
                 self._aside.clear()
+                self._gl.fbo.depth_mask = True  # moderngl leaves it as the other framebuffer has it
 
     def draw_transparent(self, meshes: list[FaceMesh]) -> None:
         """Draw the other parts, over what they may let through."""
@@ -106,8 +109,10 @@ class FaceRenderer:
 
     def _program(self, options: tuple[str, ...]) -> Any:
         if options not in self._programs:
-            self._programs[options] = load_program(self._gl, "face", *options)
-            self._set_camera(self._programs[options])
+            program = self._programs[options] = load_program(self._gl, "face", *options)
+            for unit, name in enumerate(("picture", "relief", "wrinkle_map", "tops")):
+                set_uniform(program, name, unit)
+            self._set_camera(program)
         return self._programs[options]
 
     def _array(self, parts: dict[str, Any], options: tuple[str, ...]) -> Any:
@@ -179,8 +184,6 @@ class FaceRenderer:
         if "CUT" in options:
             set_uniform(program, "cut", CORE_OPACITY if core else shape.cutoff)
         if self._shade is not None:
-            self._shade.tops.use(3)
-            set_uniform(program, "tops", 3)
             set_uniform(program, "frame", self._shade.frame)
             set_uniform(program, "clearance", CLEAR_OF_FACES if mesh.limbs is None else CLEAR)
         if picture is not None:
@@ -255,7 +258,6 @@ def _set_shape(program: Any, shape: FaceShape) -> None:
     set_uniform(program, "scatter", shape.scatter)
     set_uniform(program, "fine", shape.fine)
     set_uniform(program, "two_sided", 1.0 if shape.two_sided else 0.0)
-    set_uniform(program, "relief", 1)
     set_uniform(program, "opacity", shape.opacity)
 
 
@@ -286,7 +288,6 @@ def _set_wrinkles(program: Any, mesh: FaceMesh) -> None:
     left, right = (tuple(float(strength) for strength in side) for side in mesh.wrinkles)
     set_uniform(program, "wrinkles_left", left)
     set_uniform(program, "wrinkles_right", right)
-    set_uniform(program, "wrinkle_map", 2)
     height = TOP - BOTTOM
     set_uniform(program, "wrinkle_window", (1 / WIDTH, -1 / height, 0.0, TOP / height))
 

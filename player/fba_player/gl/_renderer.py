@@ -36,6 +36,8 @@ MIN_MARK_RADIUS = 0.9
 """Least radius of a mark, pixels."""
 MARK_LIFT = 0.003
 """Marks are drawn over surfaces that hide them by less than this (m)."""
+EYE_ROWS, SMALL_EYE = ((20, 32), (8, 14)), 6.0
+"""Rows and columns of vertices of an eyeball, and of one whose radius is less than so many pixels."""
 CACHED_SHAPES = 32
 """Number of meshes whose buffers are cached; the least recently used goes first."""
 
@@ -66,11 +68,7 @@ class Renderer:
         self._instances = context.buffer(reserve=CAPSULE_FLOATS * 4 * 128, dynamic=True)
         self._capsule_parts = _make_buffers(context, *capsule_mesh())
         self._capsules = self._capsule_array()
-        vertices, inward = sphere_mesh()
-        self._eye_parts = _make_buffers(context, vertices, inward[:, ::-1])
-        points, triangles = self._eye_parts
-        attributes = [(points, "3f", "in_position")]
-        self._eye = context.vertex_array(self._programs["eye"], attributes, index_buffer=triangles)
+        self._eyeballs = [self._make_eyeball(*rows) for rows in EYE_ROWS]
         self._outliner = Outliner()
         self._details = Details()
         self._extras = ExtrasRenderer(context)
@@ -136,7 +134,7 @@ class Renderer:
         self._faces.draw_opaque(drawn.faces)
         gl.enable(gl.CULL_FACE)
         for ball in view.eyes:  # after the skin, which hides most of them, and before lashes
-            self._draw_eye(ball)
+            self._draw_eye(ball, eye, pixel)
         gl.disable(gl.CULL_FACE)
         self._faces.draw_transparent(drawn.faces)
         if view.extras is not None:
@@ -165,7 +163,7 @@ class Renderer:
         for part in (
             *(self._backdrop[:0:-1] if self._backdrop else ()), self._shadow, self._square, self._blobs,
             self._studio, self._studio_buffer, self._capsules, self._instances, *self._capsule_parts,
-            self._eye, *self._eye_parts, *self._programs.values(),
+            *(part for parts in self._eyeballs for part in parts), *self._programs.values(),
         ):  # fmt: skip
             part.release()
 
@@ -288,17 +286,28 @@ class Renderer:
         gl.depth_func = "<"
         gl.enable_only(gl.DEPTH_TEST)
 
-    def _draw_eye(self, ball: Eye) -> None:
+    def _make_eyeball(self, rows: int, around: int) -> tuple[Any, Any, Any]:
+        """Return the vertex array of a sphere of so many vertices, and its buffers."""
+        vertices, inward = sphere_mesh(rows, around)
+        points, triangles = _make_buffers(self._gl, vertices, inward[:, ::-1])
+        attributes = [(points, "3f", "in_position")]
+        program = self._programs["eye"]
+        return self._gl.vertex_array(program, attributes, index_buffer=triangles), points, triangles
+
+    def _draw_eye(self, ball: Eye, eye: Float64, pixel: float) -> None:
+        """Draw an eyeball for a camera at `eye` (3,). pixel: its size at distance 1."""
         program = self._programs["eye"]
         set_uniform(program, "world", matrix_bytes(ball.matrix))
         set_uniform(program, "iris", ball.iris)
         set_uniform(program, "pupil", ball.pupil)
         set_uniform(program, "lids", np.ascontiguousarray(ball.lids, dtype="f4").tobytes())
         set_uniform(program, "head", matrix_bytes(ball.axes))
-        axes = ball.matrix[:3, :3] / max(float(np.linalg.norm(ball.matrix[:3, 0])), 1e-9)
+        radius = max(float(np.linalg.norm(ball.matrix[:3, 0])), 1e-9)
+        axes = ball.matrix[:3, :3] / radius
         set_uniform(program, "ball", matrix_bytes(axes))
         set_uniform(program, "tint", ball.tint)
-        self._eye.render()
+        small = radius < SMALL_EYE * pixel * float(np.linalg.norm(ball.matrix[:3, 3] - eye))
+        self._eyeballs[small][0].render()
 
 
 def _make_buffers(context: Any, vertices: Float32, triangles: Int32) -> tuple[Any, Any]:

@@ -26,11 +26,13 @@ def move_view(view: View, offset: Float64) -> View:
     if not offset.any():
         return view
     shift = translation(offset)
+    # Parts with one matrix keep one: renderers set it once.
+    matrices = {id(mesh.matrix): shift @ mesh.matrix for mesh in view.faces}
     flat = np.array([offset[0], offset[2], 0.0, 0.0], dtype=np.float32)
     return replace(
         view,
         meshes=[replace(mesh, matrix=shift @ mesh.matrix) for mesh in view.meshes],
-        faces=[mesh._replace(matrix=shift @ mesh.matrix) for mesh in view.faces],
+        faces=[mesh._replace(matrix=matrices[id(mesh.matrix)]) for mesh in view.faces],
         eyes=[eye._replace(matrix=shift @ eye.matrix) for eye in view.eyes],
         capsules=_move_capsules(view.capsules, offset),
         marks=_move_capsules(view.marks, offset),

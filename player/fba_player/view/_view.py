@@ -110,6 +110,11 @@ class FaceShape:
         texcoords = np.zeros((len(self.sway), 2)) if self.texcoords is None else self.texcoords
         return np.concatenate([self.colours, texcoords, self.sway[:, None]], axis=1).astype(np.float32)
 
+    @cached_property
+    def hair_width(self) -> float:
+        """Half the width (m) of the widest single hair; 0 without any."""
+        return 0.0 if self.across is None else float(self.across[:, 3].max(initial=0.0))
+
     @property
     def see_through(self) -> bool:
         """Whether parts of it are transparent: its picture has alpha, or it consists of hairs."""

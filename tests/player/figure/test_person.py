@@ -115,8 +115,8 @@ def test_real_clips_stand_on_the_ground(shared: Path) -> None:
 @pytest.mark.parametrize("away", [0.7, 1.0, 5.0, 12.0, 40.0])
 def test_what_is_moved_for_a_distance_is_drawn_as_if_all_were(away: float) -> None:
     """The vertices of the levels of detail that are chosen there, and those of a body's shadow."""
-    pose = {32: 9000, 60: 90000, 61: -40000}
-    scene = Scene(Animation(25, np.arange(1), face_track([{3: 600, 19: 500}]), body_track([pose])))  # type: ignore[arg-type]
+    pose, face = {32: 9000, 60: 90000, 61: -40000}, {3: 600, 5: -900, 19: 500}
+    scene = Scene(Animation(25, np.arange(1), face_track([face]), body_track([pose])))  # type: ignore[arg-type]
     seen = Seen(np.array([0.3, 1.2, away]), 0.0006)
     every, some = scene.view_at(0.0), scene.view_at(0.0, seen)
     assert (some.faces[-1].finest > 0) == (away > 3)
@@ -127,6 +127,17 @@ def test_what_is_moved_for_a_distance_is_drawn_as_if_all_were(away: float) -> No
         for field in ("positions", "normals"):
             np.testing.assert_array_equal(getattr(one, field)[used], getattr(other, field)[used])
         np.testing.assert_allclose(one.light[used], other.light[used], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("away", "lip", "seen"), [(0.7, 0, False), (0.7, -200, True), (5.0, -200, True), (40.0, -200, False)]
+)
+def test_teeth_and_tongue_are_left_out_behind_shut_lips(away: float, lip: int, *, seen: bool) -> None:
+    scene = Scene(Animation(25, np.arange(1), face_track([{5: lip}]), body_track([{}])))  # type: ignore[arg-type]
+    kinds = {mesh.shape.kind for mesh in scene.view_at(0.0, Seen(np.array([0.0, 1.6, away]), 0.0006)).faces}
+    assert {"skin", "hair"} < kinds
+    assert ({"teeth", "tongue"} <= kinds) == seen == ("teeth" in kinds)
+    assert "teeth" in {mesh.shape.kind for mesh in scene.view_at(0.0).faces}
 
 
 def test_switches_show_all_vertices() -> None:

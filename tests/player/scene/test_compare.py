@@ -236,6 +236,13 @@ def test_both_figures_are_in_the_picture(pair: CompareScene, opengl: None) -> No
     assert dark[1] < 0.8 * dark[0]
 
 
+def test_of_many_parts_every_one_hides_what_is_behind_it(opengl: None) -> None:
+    with Offscreen(CompareScene([Scene(walk([0])), Scene(walk([0]))]), (320, 180), "front") as offscreen:
+        picture = offscreen.frame(0.0)[..., :3].astype(int)
+    counts = [(half[..., 0] - half[..., 2] > 50).sum() for half in (picture[:, :160], picture[:, 160:])]
+    assert min(counts) > 0.9 * max(counts) > 1000  # skin: the second head is not seen from within
+
+
 def test_colours_are_of_the_distance_from_the_first(pair: CompareScene) -> None:
     pair.arrangement = "colour"
     try:
