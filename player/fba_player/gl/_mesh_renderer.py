@@ -73,6 +73,7 @@ class FaceRenderer:
                 # Software OpenGL collects triangles until another framebuffer is used, then fills pixels in
                 # threads of its own, while this one draws on. It slows down with what it has collected.
                 self._aside.clear()
+                self._gl.fbo.depth_mask = True  # moderngl leaves it as the other framebuffer has it
 
     def draw_transparent(self, meshes: list[FaceMesh]) -> None:
         """Draw the other parts, over what they may let through."""
