@@ -14,8 +14,8 @@ from fba_player.scene.scene import Scene
 from fba_player.session._keys import key_of
 from fba_player.session._session import Session
 
-NOTICE_DISTANCE = 40.0
-"""Points from the bar to notices, which leaves room for the text under the mouse of the timeline."""
+NOTICE_DISTANCE = 54.0
+"""Points from the bar to notices, which leaves room for two lines of text at the mouse of the timeline."""
 FADE_SECONDS = 0.4
 """Seconds in which a notice fades."""
 MAX_BUTTONS_SHARE = 0.55
@@ -24,13 +24,15 @@ SLOW = 0.9
 """Speed below which a recording says that the window is slower than its film."""
 MAX_NAME_SHARE = 0.25
 """Share of the window's width that the name and the facts may take together: a figure is in the middle."""
-WELCOME_HEIGHT = 44.0
+WELCOME_HEIGHT = 50.0
 """Points that the strip of hints takes above the bar."""
 HINTS = (
     ("panel file", "contents of the file"), ("panel curves", "curves"), ("panel puppet", "move it by hand"),
-    ("lanes", "lanes of the timeline"), ("panel help", "all keys"),
+    ("panel files", "open, export"), ("lanes", "lanes of the timeline"), ("panel help", "all keys"),
 )  # fmt: skip
 """Actions, and what the strip in the first window says of their keys."""
+BUTTONS_HEIGHT = 34.0
+"""Height of the buttons of the panels in points."""
 MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
@@ -71,15 +73,18 @@ def live_message(session: Session) -> str:
 
 
 def draw_name(session: Session, display: tuple[float, float], taken: float, room: float) -> None:
-    """Draw the name and rate of the file in the upper left corner.
+    """Draw the name and rate of the file in the upper left corner, unless the picture has names or a legend.
 
     taken: points that are used at the left. room: right limit in points.
     """
-    if display[0] < MIN_NAME_WIDTH or display[1] < 200:
+    scene = session.scene
+    if isinstance(scene, CompareScene) and scene.arrangement != "over":
+        return
+    if display[0] < MIN_NAME_WIDTH or display[1] < 200 or scene.switches["influence"] is not None:
         return
     to = imgui.get_background_draw_list()
     x, y = EDGE + 4 + taken, EDGE + 7
-    name = session.source.name or session.scene.title
+    name = session.source.name or scene.title
     message = live_message(session)
     facts = message or _facts(session)
     right = room if message else min(room, MAX_NAME_SHARE * display[0])
@@ -93,7 +98,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
 
 def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
     """Draw a button for each panel, or one for all, in the upper right corner; return their left edge."""
-    if display[0] < 130 or display[1] < 200:
+    if not buttons_height(display):
         return display[0]
     labels = [panel.label for panel in panels]
     wide = _width(labels)
@@ -102,7 +107,7 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
         wide = _width(["Panels"])
     left = display[0] - EDGE - wide
     imgui.set_next_window_pos((left, EDGE))
-    imgui.set_next_window_size((wide, 34))
+    imgui.set_next_window_size((wide, BUTTONS_HEIGHT))
     imgui.push_style_var(imgui.StyleVar_.window_padding, (5, 4))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, (4, 4))
     imgui.push_style_var(imgui.StyleVar_.frame_padding, (11, (26 - imgui.get_font_size()) / 2))
@@ -124,6 +129,11 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
         imgui.end_popup()
     imgui.end()
     return left
+
+
+def buttons_height(display: tuple[float, float]) -> float:
+    """Return the height of the buttons of the panels in points: 0 in a display that has no room for them."""
+    return 0.0 if display[0] < 130 or display[1] < 200 else BUTTONS_HEIGHT
 
 
 def _width(labels: list[str]) -> float:

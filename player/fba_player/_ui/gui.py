@@ -8,7 +8,15 @@ from imgui_bundle import imgui, implot
 
 from fba_player._ui import theme
 from fba_player._ui._bar import Bar
-from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_welcome, draw_work, live_message
+from fba_player._ui._hud import (
+    buttons_height,
+    draw_buttons,
+    draw_name,
+    draw_notices,
+    draw_welcome,
+    draw_work,
+    live_message,
+)
 from fba_player._ui._imgui_renderer import ImguiRenderer
 from fba_player._ui._panel_windows import PanelWindows
 from fba_player._ui.panels.registry import make_panels
@@ -120,7 +128,9 @@ class Gui:
         """Tell the camera how much of the picture the bar covers."""
         session = self.session
         wide, high = (pixels / session.scale for pixels in session.size)
-        session.viewpoint.covered = 0.0 if session.bare else self._bar_height((wide, high)) / max(high, 1.0)
+        shown = 0.0 if session.bare else 1.0 / max(high, 1.0)
+        session.viewpoint.covered = shown * self._bar_height((wide, high))
+        session.viewpoint.covered_above = shown * buttons_height((wide, high)) if self._plays else 0.0
 
     def _draw_all(self, display: tuple[float, float], io: imgui.IO) -> None:
         session = self.session
@@ -160,7 +170,7 @@ class Gui:
             self._message, self._told = message, session.clock()
         told = session.clock() - self._told < HIDE_SECONDS or session.transport.waiting
         quiet = session.idle > HIDE_SECONDS and not (message and told)
-        away = self.hides and session.transport.playing and quiet and not busy
+        away = self.hides and session.transport.playing and quiet and not busy and not session.greets
         step = io.delta_time / FADE_SECONDS
         self.shown = max(self.shown - step, 0.0) if away else min(self.shown + 2 * step, 1.0)
 

@@ -29,7 +29,7 @@ BROWSE_WIDTH = 86.0
 class FilesPanel(Panel):
     """The name of a file to open; and name, kind, size and part of an export, and how far it is."""
 
-    name, title, label = "files", "Open and export", "Export"
+    name, title, label = "files", "Open and export", "File"
     width, height, fitted, least = 340.0, 330.0, True, 200.0
 
     def __init__(self) -> None:
