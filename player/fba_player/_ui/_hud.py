@@ -46,7 +46,7 @@ def draw_work(session: Session) -> float:
     x, y = EDGE + 4 + taken, EDGE + 7
     to = imgui.get_background_draw_list()
     text = f"Export {export.share:.0%}" if export.total else "Export begins"
-    to.add_rect_filled((x, y + 3), (x + 60, y + 15), theme.packed(theme.LINE), rounding=3.0)
+    to.add_rect_filled((x, y + 3), (x + 60, y + 15), theme.packed(theme.GROUND), rounding=3.0)
     to.add_rect_filled((x, y + 3), (x + 60 * export.share, y + 15), theme.packed(theme.ACCENT), rounding=3.0)
     _draw_shadowed(to, (x + 70, y), theme.packed(theme.TEXT), text)
     return taken + 90.0 + float(imgui.calc_text_size(text).x)

@@ -206,7 +206,7 @@ class Window(Closing):
     def close(self) -> None:
         """Finish a film, close the window and release its resources; safe to call twice."""
         try:
-            self.session.exports.cancel()
+            self.session.exports.close()
             self.captures.close()
         finally:
             parts = (self._covering, self._gui, self._overlay, self._renderer, self._target, self._readback)

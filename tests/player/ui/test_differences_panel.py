@@ -19,7 +19,7 @@ from studio_hand import panel_of
 
 graphics.imported("imgui_bundle")
 
-from fba_player._ui.panels._differences_panel import DifferencesPanel, thin_curve  # noqa: E402 - needs imgui
+from fba_player._ui.panels._differences_panel import DifferencesPanel, _shown, thin_curve  # noqa: E402 - needs imgui
 from tools.window_picture import Studio  # noqa: E402
 
 SIZE = (900, 640)
@@ -56,6 +56,12 @@ def test_a_row_takes_to_where_the_difference_is_largest(studio: Studio) -> None:
     assert accent > 100  # the curve and the heading
     click(studio, (600.0, 186.0))
     assert studio.session.transport.time == pytest.approx(0.2)
+
+
+def test_angles_are_shown_in_degrees() -> None:
+    factor, unit = _shown("1e-5 rad")
+    assert (round(factor * 174533, 2), unit) == (100.0, "deg")
+    assert _shown("MNS") == (1.0, "MNS")
 
 
 def test_it_is_there_only_where_something_is_compared(opengl: None) -> None:
