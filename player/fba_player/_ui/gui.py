@@ -178,6 +178,8 @@ class Gui:
         """Pass the mouse to the controls where no panel is under it."""
         controls, scale = self.controls, self.session.scale
         x, y = io.mouse_pos.x * scale, io.mouse_pos.y * scale
+        if controls.at_wipe(x) and not io.want_capture_mouse:
+            imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
         if controls.holding:
             controls.move(x, y)
             if not imgui.is_mouse_down(self._button):

@@ -94,6 +94,18 @@ def test_curves_of_the_second_performance_are_shown_on_demand(studio: Studio) ->
     assert panel._lanes[0].course.values.tolist() == [0, 10, 90, 30]
 
 
+def test_files_made_from_a_comparison_bear_both_names(studio: Studio) -> None:
+    assert studio.session.source.stem == "a-b"
+
+
+def test_the_mouse_shows_that_the_line_of_a_wipe_can_be_dragged(studio: Studio) -> None:
+    studio.session.scene.arrangement = "wipe"  # type: ignore[attr-defined]
+    for x, cursor in ((SIZE[0] / 2, "resize_ew"), (SIZE[0] / 4, "arrow")):
+        studio.gui.io.add_mouse_pos_event(x, 200.0)
+        studio.settle(3)
+        assert studio.gui.cursor == cursor
+
+
 def test_the_file_panel_describes_each_file(studio: Studio) -> None:
     from fba_player._ui.panels._file_panel import _sections
 

@@ -74,7 +74,7 @@ class FilesPanel(Panel):
         marked = transport.mark_in is not None or transport.mark_out is not None
         if marked and suffix != ".png":
             _, self._marked = imgui.checkbox("between the marks", self._marked)
-        proposed = Path((session.source.name or "fba").replace(" | ", "-")).stem + suffix
+        proposed = session.source.stem + suffix
         self._exported, entered = self._name("export", self._exported, proposed)
         if session.exports.now is None:
             if self._button("Export file") or entered:
