@@ -33,6 +33,8 @@ HINTS = (
 """Actions, and what the strip in the first window says of their keys."""
 BUTTONS_HEIGHT = 34.0
 """Height of the buttons of the panels in points."""
+MAX_NOTICE_WIDTH = 420.0
+"""Points; longer notices have several lines."""
 MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
@@ -180,22 +182,23 @@ def _hints_width(hints: list[tuple[str, str]]) -> float:
     return texts + float(imgui.calc_text_size("Got it").x) + 2 * 16 + 2 * imgui.get_style().frame_padding.x
 
 
-def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
-    """Draw the notices, centred above the bar."""
+def draw_notices(session: Session, display: tuple[float, float], left: float, above: float) -> None:
+    """Draw the notices above the bar, at the left of the figure. left: points that panels take there."""
     to = imgui.get_foreground_draw_list()
     y = display[1] - above - NOTICE_DISTANCE - (WELCOME_HEIGHT if session.greets else 0.0)
     for notice in reversed(session.notices()):
         alpha = min((notice.until - session.clock()) / FADE_SECONDS, 1.0)
         colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)
-        size = imgui.calc_text_size(notice.text, False, max(display[0] - 80, 60))
-        left = (display[0] - size.x) / 2
+        wide = max(min(display[0] - left - EDGE, MAX_NOTICE_WIDTH) - 34, 60)
+        size = imgui.calc_text_size(notice.text, False, wide)
+        x = left + EDGE + 20
         y -= size.y + 16
-        corner = (left - 20, y), (left + size.x + 14, y + size.y + 16)
+        corner = (x - 20, y), (x + size.x + 14, y + size.y + 16)
         to.add_rect_filled(*corner, theme.packed((0.105, 0.112, 0.124, 0.96), alpha), rounding=8.0)
-        bar = (left - 13, y + 8), (left - 10, y + size.y + 8)
+        bar = (x - 13, y + 8), (x - 10, y + size.y + 8)
         to.add_rect_filled(*bar, theme.packed(colour, alpha), rounding=1.5)
         font, shade = (imgui.get_font(), imgui.get_font_size()), theme.packed(theme.TEXT, alpha)
-        to.add_text(*font, (left, y + 8), shade, notice.text, max(display[0] - 80, 60))
+        to.add_text(*font, (x, y + 8), shade, notice.text, wide)
         y -= 8
 
 

@@ -9,6 +9,7 @@ from imgui_bundle import imgui, implot
 from fba_player._ui import theme
 from fba_player._ui._bar import Bar
 from fba_player._ui._hud import (
+    WELCOME_HEIGHT,
     buttons_height,
     draw_buttons,
     draw_name,
@@ -95,10 +96,11 @@ class Gui:
             self._mouse(io)
         if not session.bare:
             self._draw_all(display, io)
+        sides = self._panel_windows.sides if not session.bare else (0.0, 0.0)
         if session.recording is None:  # opening a panel must not move the picture of a film
-            sides = (0.0, 0.0) if session.bare else self._panel_windows.sides
             session.viewpoint.uncover(*sides, smoothly=self.hides)
-        draw_notices(session, display, self._bar_height(display) * self.shown if not session.bare else 0.0)
+        below = self._bar_height(display) * self.shown if not session.bare else 0.0
+        draw_notices(session, display, sides[0] * display[0], below)
         self._popups()
         imgui.render()
         self._renderer.draw(imgui.get_draw_data())
@@ -129,7 +131,8 @@ class Gui:
         session = self.session
         wide, high = (pixels / session.scale for pixels in session.size)
         shown = 0.0 if session.bare else 1.0 / max(high, 1.0)
-        session.viewpoint.covered = shown * self._bar_height((wide, high))
+        hints = WELCOME_HEIGHT if session.greets and self._page is None else 0.0
+        session.viewpoint.covered = shown * (self._bar_height((wide, high)) + hints)
         session.viewpoint.covered_above = shown * buttons_height((wide, high)) if self._plays else 0.0
 
     def _draw_all(self, display: tuple[float, float], io: imgui.IO) -> None:

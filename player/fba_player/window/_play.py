@@ -110,7 +110,8 @@ def play(
             window.transport.seek(start)
         if resumed is not None:
             _resume(session, resumed)
-        elif not paused:
+            paused = not resumed.playing
+        if window.update() and not paused:  # the first picture takes long: time begins when it is there
             window.transport.play()
         window.run()
         surface.resumed = _state(session) if session.resumes else None
@@ -172,8 +173,6 @@ def _resume(session: Session, state: Resumed) -> None:
         zoom.bound(transport.start, transport.end)
         zoom.zoom((high - low) / max(zoom.high - zoom.low, 1e-9), zoom.low)
         zoom.pan(low - zoom.low)
-    if state.playing:
-        transport.play()
     session.say(f"{session.source.name} has changed on disk, and is shown again", about="reload")
 
 
