@@ -81,6 +81,7 @@ class Window(Closing):
         self._owned = surface is None
         timeline = scene.timeline
         self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=camera, size=size)
+        self.session.memory = self._surface.memory
         self.captures = Captures(self.session, folder)
         self.pictures = 0
         self._title = title or scene.title or "fba"
