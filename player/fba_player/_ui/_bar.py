@@ -144,8 +144,8 @@ class Bar:
         self._draw_trace(session, ruler, top)
         if lanes:
             name = "motion" if session.source.info.plane_bits is None else "bits"
-            at = (ruler.left - GUTTER, (top + bottom) / 2 - theme.SMALL / 2)
-            to.add_text(imgui.get_font(), theme.SMALL, at, theme.packed(theme.FAINT), name)
+            place = (ruler.left - GUTTER, (top + bottom) / 2 - theme.SMALL / 2)
+            to.add_text(imgui.get_font(), theme.SMALL, place, theme.packed(theme.FAINT), name)
         at = ruler.x(session.transport.time)
         to.add_rect_filled((ruler.left, top), (at, bottom), theme.packed(theme.ACCENT, 0.16), rounding=4.0)
         self._scale(to, ruler, y, bottom)
