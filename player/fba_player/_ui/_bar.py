@@ -7,6 +7,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from fba_player._ui import theme
+from fba_player._ui._hud import WELCOME_HEIGHT
 from fba_player._ui._imgui_renderer import ImguiRenderer
 from fba_player._ui._lane_rows import GUTTER, LaneRows
 from fba_player._ui._transport_buttons import SIDE_MARGIN, Buttons
@@ -141,6 +142,10 @@ class Bar:
         self._wheel(session.zoom, ruler)
         to.add_rect_filled((ruler.left, top), (ruler.right, bottom), theme.packed(theme.LINE), rounding=4.0)
         self._draw_trace(session, ruler, top)
+        if lanes:
+            name = "motion" if session.source.info.plane_bits is None else "bits"
+            place = (ruler.left - GUTTER, (top + bottom) / 2 - theme.SMALL / 2)
+            to.add_text(imgui.get_font(), theme.SMALL, place, theme.packed(theme.FAINT), name)
         at = ruler.x(session.transport.time)
         to.add_rect_filled((ruler.left, top), (at, bottom), theme.packed(theme.ACCENT, 0.16), rounding=4.0)
         self._scale(to, ruler, y, bottom)
@@ -268,7 +273,7 @@ class Bar:
         size = imgui.calc_text_size(text)
         left = min(max(x - size.x / 2, ruler.left), max(ruler.right - size.x, ruler.left))
         over = imgui.get_foreground_draw_list()
-        upper = top - 39 - size.y
+        upper = top - 39 - size.y - (WELCOME_HEIGHT if session.greets else 0.0)
         box = (left - 9, upper), (left + size.x + 9, upper + size.y + 10)
         over.add_rect_filled(*box, theme.packed((0.105, 0.112, 0.124, 0.98)), rounding=6.0)
         over.add_rect(*box, theme.packed(theme.LINE), rounding=6.0)

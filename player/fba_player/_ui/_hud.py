@@ -14,8 +14,8 @@ from fba_player.scene.scene import Scene
 from fba_player.session._keys import key_of
 from fba_player.session._session import Session
 
-NOTICE_DISTANCE = 40.0
-"""Points from the bar to notices, which leaves room for the text under the mouse of the timeline."""
+NOTICE_DISTANCE = 54.0
+"""Points from the bar to notices, which leaves room for two lines of text at the mouse of the timeline."""
 FADE_SECONDS = 0.4
 """Seconds in which a notice fades."""
 MAX_BUTTONS_SHARE = 0.55
@@ -24,13 +24,17 @@ SLOW = 0.9
 """Speed below which a recording says that the window is slower than its film."""
 MAX_NAME_SHARE = 0.25
 """Share of the window's width that the name and the facts may take together: a figure is in the middle."""
-WELCOME_HEIGHT = 44.0
+WELCOME_HEIGHT = 50.0
 """Points that the strip of hints takes above the bar."""
 HINTS = (
     ("panel file", "contents of the file"), ("panel curves", "curves"), ("panel puppet", "move it by hand"),
-    ("lanes", "lanes of the timeline"), ("panel help", "all keys"),
+    ("panel files", "open, export"), ("lanes", "lanes of the timeline"), ("panel help", "all keys"),
 )  # fmt: skip
 """Actions, and what the strip in the first window says of their keys."""
+BUTTONS_HEIGHT = 34.0
+"""Height of the buttons of the panels in points."""
+MAX_NOTICE_WIDTH = 420.0
+"""Points; longer notices have several lines."""
 MIN_NAME_WIDTH = 560.0
 """Width in points below which the name is left out."""
 
@@ -44,7 +48,7 @@ def draw_work(session: Session) -> float:
     x, y = EDGE + 4 + taken, EDGE + 7
     to = imgui.get_background_draw_list()
     text = f"Export {export.share:.0%}" if export.total else "Export begins"
-    to.add_rect_filled((x, y + 3), (x + 60, y + 15), theme.packed(theme.LINE), rounding=3.0)
+    to.add_rect_filled((x, y + 3), (x + 60, y + 15), theme.packed(theme.GROUND), rounding=3.0)
     to.add_rect_filled((x, y + 3), (x + 60 * export.share, y + 15), theme.packed(theme.ACCENT), rounding=3.0)
     _draw_shadowed(to, (x + 70, y), theme.packed(theme.TEXT), text)
     return taken + 90.0 + float(imgui.calc_text_size(text).x)
@@ -71,15 +75,18 @@ def live_message(session: Session) -> str:
 
 
 def draw_name(session: Session, display: tuple[float, float], taken: float, room: float) -> None:
-    """Draw the name and rate of the file in the upper left corner.
+    """Draw the name and rate of the file in the upper left corner, unless the picture has names or a legend.
 
     taken: points that are used at the left. room: right limit in points.
     """
-    if display[0] < MIN_NAME_WIDTH or display[1] < 200:
+    scene = session.scene
+    if isinstance(scene, CompareScene) and scene.arrangement != "over":
+        return
+    if display[0] < MIN_NAME_WIDTH or display[1] < 200 or scene.switches["influence"] is not None:
         return
     to = imgui.get_background_draw_list()
     x, y = EDGE + 4 + taken, EDGE + 7
-    name = session.source.name or session.scene.title
+    name = session.source.name or scene.title
     message = live_message(session)
     facts = message or _facts(session)
     right = room if message else min(room, MAX_NAME_SHARE * display[0])
@@ -93,7 +100,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
 
 def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
     """Draw a button for each panel, or one for all, in the upper right corner; return their left edge."""
-    if display[0] < 130 or display[1] < 200:
+    if not buttons_height(display):
         return display[0]
     labels = [panel.label for panel in panels]
     wide = _width(labels)
@@ -102,7 +109,7 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
         wide = _width(["Panels"])
     left = display[0] - EDGE - wide
     imgui.set_next_window_pos((left, EDGE))
-    imgui.set_next_window_size((wide, 34))
+    imgui.set_next_window_size((wide, BUTTONS_HEIGHT))
     imgui.push_style_var(imgui.StyleVar_.window_padding, (5, 4))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, (4, 4))
     imgui.push_style_var(imgui.StyleVar_.frame_padding, (11, (26 - imgui.get_font_size()) / 2))
@@ -124,6 +131,11 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
         imgui.end_popup()
     imgui.end()
     return left
+
+
+def buttons_height(display: tuple[float, float]) -> float:
+    """Return the height of the buttons of the panels in points: 0 in a display that has no room for them."""
+    return 0.0 if display[0] < 130 or display[1] < 200 else BUTTONS_HEIGHT
 
 
 def _width(labels: list[str]) -> float:
@@ -170,22 +182,23 @@ def _hints_width(hints: list[tuple[str, str]]) -> float:
     return texts + float(imgui.calc_text_size("Got it").x) + 2 * 16 + 2 * imgui.get_style().frame_padding.x
 
 
-def draw_notices(session: Session, display: tuple[float, float], above: float) -> None:
-    """Draw the notices, centred above the bar."""
+def draw_notices(session: Session, display: tuple[float, float], left: float, above: float) -> None:
+    """Draw the notices above the bar, at the left of the figure. left: points that panels take there."""
     to = imgui.get_foreground_draw_list()
     y = display[1] - above - NOTICE_DISTANCE - (WELCOME_HEIGHT if session.greets else 0.0)
     for notice in reversed(session.notices()):
         alpha = min((notice.until - session.clock()) / FADE_SECONDS, 1.0)
         colour = {"error": theme.ALERT, "warning": theme.WARM}.get(notice.kind, theme.ACCENT)
-        size = imgui.calc_text_size(notice.text, False, max(display[0] - 80, 60))
-        left = (display[0] - size.x) / 2
+        wide = max(min(display[0] - left - EDGE, MAX_NOTICE_WIDTH) - 34, 60)
+        size = imgui.calc_text_size(notice.text, False, wide)
+        x = left + EDGE + 20
         y -= size.y + 16
-        corner = (left - 20, y), (left + size.x + 14, y + size.y + 16)
+        corner = (x - 20, y), (x + size.x + 14, y + size.y + 16)
         to.add_rect_filled(*corner, theme.packed((0.105, 0.112, 0.124, 0.96), alpha), rounding=8.0)
-        bar = (left - 13, y + 8), (left - 10, y + size.y + 8)
+        bar = (x - 13, y + 8), (x - 10, y + size.y + 8)
         to.add_rect_filled(*bar, theme.packed(colour, alpha), rounding=1.5)
         font, shade = (imgui.get_font(), imgui.get_font_size()), theme.packed(theme.TEXT, alpha)
-        to.add_text(*font, (left, y + 8), shade, notice.text, max(display[0] - 80, 60))
+        to.add_text(*font, (x, y + 8), shade, notice.text, wide)
         y -= 8
 
 

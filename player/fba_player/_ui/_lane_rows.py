@@ -152,12 +152,12 @@ def _draw_title(to: imgui.ImDrawList, row: _Row, area: tuple[float, float, float
 def _draw_names(
     to: imgui.ImDrawList, lane: Lane, ruler: Ruler, area: tuple[float, float, float, float]
 ) -> None:
-    """Draw the names in a lane where there is room for them."""
+    """Draw the names in the middle of what they stand for, where a viseme is strongest, if there is room."""
     seconds = (ruler.high - ruler.low) / max(ruler.right - ruler.left, 1.0)
     taken = ruler.left
     for start, end, name in lane.named(ruler.low, ruler.high, NAME_ROOM * seconds):
-        left = max(ruler.x(start), taken) + 3
         wide = imgui.calc_text_size(name).x * theme.SMALL / theme.FONT_SIZE
+        left = max((ruler.x(start) + ruler.x(end) - wide) / 2, taken + 3)
         if left + wide + 2 > ruler.x(end):
             continue
         at = (left, (area[1] + area[3]) / 2 - theme.SMALL / 2 - 1)

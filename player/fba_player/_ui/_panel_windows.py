@@ -67,7 +67,7 @@ class PanelWindows:
     def _draw_free(self, panel: Panel, session: Session, display: tuple[float, float], room: float) -> None:
         wide = min(panel.width, display[0] - 2 * EDGE)
         if panel.name not in self._moved:
-            high = min(panel.height, room)
+            high = min(self._request(panel).height, room)
             place = ((display[0] - wide) / 2, COLUMNS_TOP + max(room - high, 0.0) / 2)
             imgui.set_next_window_pos(place, imgui.Cond_.always)
             imgui.set_next_window_size((wide, high), imgui.Cond_.always)

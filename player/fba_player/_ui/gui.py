@@ -8,7 +8,16 @@ from imgui_bundle import imgui, implot
 
 from fba_player._ui import theme
 from fba_player._ui._bar import Bar
-from fba_player._ui._hud import draw_buttons, draw_name, draw_notices, draw_welcome, draw_work, live_message
+from fba_player._ui._hud import (
+    WELCOME_HEIGHT,
+    buttons_height,
+    draw_buttons,
+    draw_name,
+    draw_notices,
+    draw_welcome,
+    draw_work,
+    live_message,
+)
 from fba_player._ui._imgui_renderer import ImguiRenderer
 from fba_player._ui._panel_windows import PanelWindows
 from fba_player._ui.panels.registry import make_panels
@@ -87,10 +96,11 @@ class Gui:
             self._mouse(io)
         if not session.bare:
             self._draw_all(display, io)
+        sides = self._panel_windows.sides if not session.bare else (0.0, 0.0)
         if session.recording is None:  # opening a panel must not move the picture of a film
-            sides = (0.0, 0.0) if session.bare else self._panel_windows.sides
             session.viewpoint.uncover(*sides, smoothly=self.hides)
-        draw_notices(session, display, self._bar_height(display) * self.shown if not session.bare else 0.0)
+        below = self._bar_height(display) * self.shown if not session.bare else 0.0
+        draw_notices(session, display, sides[0] * display[0], below)
         self._popups()
         imgui.render()
         self._renderer.draw(imgui.get_draw_data())
@@ -120,7 +130,10 @@ class Gui:
         """Tell the camera how much of the picture the bar covers."""
         session = self.session
         wide, high = (pixels / session.scale for pixels in session.size)
-        session.viewpoint.covered = 0.0 if session.bare else self._bar_height((wide, high)) / max(high, 1.0)
+        shown = 0.0 if session.bare else 1.0 / max(high, 1.0)
+        hints = WELCOME_HEIGHT if session.greets and self._page is None else 0.0
+        session.viewpoint.covered = shown * (self._bar_height((wide, high)) + hints)
+        session.viewpoint.covered_above = shown * buttons_height((wide, high)) if self._plays else 0.0
 
     def _draw_all(self, display: tuple[float, float], io: imgui.IO) -> None:
         session = self.session
@@ -160,7 +173,7 @@ class Gui:
             self._message, self._told = message, session.clock()
         told = session.clock() - self._told < HIDE_SECONDS or session.transport.waiting
         quiet = session.idle > HIDE_SECONDS and not (message and told)
-        away = self.hides and session.transport.playing and quiet and not busy
+        away = self.hides and session.transport.playing and quiet and not busy and not session.greets
         step = io.delta_time / FADE_SECONDS
         self.shown = max(self.shown - step, 0.0) if away else min(self.shown + 2 * step, 1.0)
 
@@ -168,6 +181,8 @@ class Gui:
         """Pass the mouse to the controls where no panel is under it."""
         controls, scale = self.controls, self.session.scale
         x, y = io.mouse_pos.x * scale, io.mouse_pos.y * scale
+        if controls.at_wipe(x) and not io.want_capture_mouse:
+            imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
         if controls.holding:
             controls.move(x, y)
             if not imgui.is_mouse_down(self._button):

@@ -86,7 +86,7 @@ def apply_theme() -> None:
         kinds.scrollbar_grab_hovered: (1, 1, 1, 0.26),
         kinds.scrollbar_grab_active: (1, 1, 1, 0.34),
         kinds.check_mark: ACCENT,
-        kinds.slider_grab: (1, 1, 1, 0.20),
+        kinds.slider_grab: (0.36, 0.68, 0.90, 0.5),
         kinds.slider_grab_active: (0.36, 0.68, 0.90, 0.75),
         kinds.button: RAISED,
         kinds.button_hovered: HOVERED,

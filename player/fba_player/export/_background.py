@@ -62,7 +62,7 @@ class Export(Closing):
     def __init__(self, scene: Any, path: PathLike, options: ExportOptions) -> None:
         self.path = Path(path)
         self.done, self.total = 0, 0
-        self.finished = False
+        self.finished = self.cancelled = False
         self.problem = ""
         self.notes: list[str] = []
         context = multiprocessing.get_context("spawn")  # a copy would share the window's OpenGL
@@ -84,6 +84,9 @@ class Export(Closing):
 
     def poll(self) -> None:
         """Take over what the other process has said since."""
+        if self.cancelled:
+            self.finished = not self._process.is_alive()
+            return
         try:
             while not self.finished and self._pipe.poll():
                 kind, value = self._pipe.recv()
@@ -98,11 +101,16 @@ class Export(Closing):
         if self.finished:
             self._process.join(5.0)
 
-    def close(self) -> None:
-        """Cancel it if it is not finished; no file is left then. Safe to call twice."""
+    def cancel(self) -> None:
+        """Ask it to stop, without a file; `poll` sets `finished` when it has. Safe to call twice."""
+        self.cancelled = True
         self._pipe.close()  # it stops at its next frame at the latest
-        if os.name == "posix":
+        if os.name == "posix" and self._process.is_alive():
             self._process.terminate()
+
+    def close(self) -> None:
+        """Cancel it if it is not finished, and wait for its end; no file is left then. Safe to call twice."""
+        self.cancel()
         self._process.join(STOP_SECONDS)
         if self._process.is_alive():
             self._process.kill()
@@ -113,7 +121,11 @@ class Export(Closing):
 def _export(pipe: Connection, scene: Any, path: str, options: ExportOptions) -> None:
     """Export a scene, in the other process; tell the window how far it is, and what goes wrong."""
 
+    stopped = False
+
     def stop(*_: object) -> None:
+        nonlocal stopped
+        stopped = True
         raise InterruptedError
 
     signal.signal(signal.SIGTERM, stop)  # so that the blocks remove their files
@@ -135,6 +147,9 @@ def _export(pipe: Connection, scene: Any, path: str, options: ExportOptions) -> 
         pass  # cancelled
     except (FbaError, OSError, ValueError) as error:
         pipe.send(("end", str(error) or type(error).__name__))
+    except RuntimeError:
+        if not stopped:  # a compiler that is interrupted says this
+            raise
 
 
 def write(scene: Any, path: str, options: ExportOptions, progress: Any = None) -> None:

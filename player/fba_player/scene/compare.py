@@ -46,6 +46,8 @@ FIELD_OF_VIEW = 14.0
 """Field of view (degrees): narrow, from further away, so that all figures are seen from the same side."""
 SHOULDER_HALF_WIDTH = 0.25
 """Half the width (m) of a body that is seen from the hips up."""
+CAPTION_ROOM = {"side": 1.05, "over": 1.0, "colour": 1.42, "wipe": 1.15}
+"""Height that figures get with their captions, and with the legend of colours over them, in their own."""
 CAPTION_HEIGHT = 0.96
 """Height of a caption above the middle of a head, in half heads."""
 
@@ -376,9 +378,7 @@ class CompareScene(Timed[CompareTimeline]):
         low = min(a - width for a, width in zip(along, widths, strict=True))
         high = max(a + width for a, width in zip(along, widths, strict=True))
         bottom = min(float(p[1]) - s.half_height for p, s in zip(centres, subjects, strict=True))
-        room = (1.15 if self._arrangement == "wipe" else 1.05) if any(self.names) else 1.0  # for captions
-        if self._arrangement == "over":
-            room = 1.0
+        room = CAPTION_ROOM[self._arrangement] if any(self.names) else 1.0
         top = max(float(p[1]) + s.half_height * room for p, s in zip(centres, subjects, strict=True))
         middle = np.mean(centres, axis=0)
         middle = middle + right * ((low + high) / 2 - float(middle @ right))

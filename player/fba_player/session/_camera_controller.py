@@ -32,8 +32,9 @@ class Viewpoint:
     which presets fit. camera: the first view, or the name of a preset; by default the one that suits the
     content. clock: returns seconds, for tests.
 
-    covered: share of the picture's height that is hidden at the bottom; presets fit above it. For what is
-    hidden at the sides see `uncover`: the picture is shifted between the panels, whatever the view.
+    covered, covered_above: shares of the picture's height that are hidden at the bottom and at the top;
+    presets fit between them. For what is hidden at the sides see `uncover`: the picture is shifted between
+    the panels, whatever the view.
     """
 
     def __init__(
@@ -46,7 +47,7 @@ class Viewpoint:
     ) -> None:
         self.scene = scene
         self.aspect = aspect
-        self.covered = 0.0
+        self.covered = self.covered_above = 0.0
         self._first_view = camera
         self._clock = clock
         self._from = self._to = self.beginning
@@ -57,7 +58,7 @@ class Viewpoint:
         self._of_head = self._preset in FACE_PRESETS
         self._time = 0.0
         self._turns_since = clock()
-        self._fitted_to = ((aspect, self.covered), self._to)
+        self._fitted_to = (self._shape, self._to)
         self._sides = (0.0, 0.0)
         self._shift_before = self._shift = NOT_SHIFTED
         self._shift_until = -math.inf
@@ -85,24 +86,35 @@ class Viewpoint:
 
     def fit(self, preset: str | None) -> Camera:
         """Return the camera of a preset, or, for None, of what suits the content, above what is covered."""
-        free = 1.0 - min(max(self.covered, 0.0), 0.5)
+        free, up = self._free
         camera = self.scene.camera(preset, self.aspect / free)
-        camera = camera.zoom(1 / free).pan(0.0, (free - 1) / 2)
-        self._fitted_to = ((self.aspect, self.covered), camera)
+        camera = camera.zoom(1 / free).pan(0.0, up)
+        self._fitted_to = (self._shape, camera)
         return camera
+
+    @property
+    def _shape(self) -> tuple[float, float, float]:
+        """What views are fitted to."""
+        return self.aspect, self.covered, self.covered_above
+
+    @property
+    def _free(self) -> tuple[float, float]:
+        """The share of the height that is not hidden, and how far its middle is below the picture's."""
+        below, above = (min(max(share, 0.0), 0.5) for share in (self.covered, self.covered_above))
+        return max(1.0 - below - above, 0.5), (above - below) / 2
 
     def refit(self) -> None:
         """Fit the view to a picture of another shape, if it is a preset that was not moved since."""
-        (aspect, covered), camera = self._fitted_to
-        if (aspect, covered) == (self.aspect, self.covered):
+        shape, camera = self._fitted_to
+        if shape == self._shape:
             return
         if self._preset != "" and self._to == camera:
-            if self.aspect == aspect:  # the bar has gone, or is back
+            if self.aspect == shape[0]:  # the bar has gone, or is back
                 self.glide(self.fit(self._preset))
             else:
                 self.camera = self.fit(self._preset)
             self._shift = self._shift_between(*self._sides)
-        self._fitted_to = ((self.aspect, self.covered), self._fitted_to[1])
+        self._fitted_to = (self._shape, self._fitted_to[1])
 
     def glide(self, camera: Camera, seconds: float = GLIDE_SECONDS) -> None:
         self._from, self._to, self._until = self.camera, camera, self._clock() + seconds
@@ -172,8 +184,7 @@ class Viewpoint:
         shift, further = self._shift_now()
         if (shift, further) == NOT_SHIFTED:
             return self.camera_without_panels(time)
-        # The middle above the bar stays where it is.
-        up = -min(max(self.covered, 0.0), 0.5) / 2 * (1 - 1 / further)
+        up = self._free[1] * (1 - 1 / further)  # the middle of what is free stays where it is
         return self.camera_without_panels(time).zoom(further).pan(-shift * self.aspect, up)
 
     @property
@@ -246,7 +257,7 @@ class Viewpoint:
         free = max(1.0 - left - right, MIN_FREE_WIDTH)
         if self._preset == "" or free >= 1.0:
             return (left - right) / 2, 1.0
-        aspect = self.aspect / (1.0 - min(max(self.covered, 0.0), 0.5))
+        aspect = self.aspect / self._free[0]
         narrow = self.scene.camera(self._preset, aspect * free).distance
         # Last: a scene arranges its figures for the camera asked for last.
         full = self.scene.camera(self._preset, aspect).distance

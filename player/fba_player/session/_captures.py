@@ -199,8 +199,7 @@ class Captures:
 
     def _unused_path(self, what: str, suffix: str) -> Path:
         """Return the path of a new file, named after the source."""
-        stem = Path(self.session.source.name or "fba").stem
-        stem = re.sub(r"[^\w. -]", "_", stem)[:60].strip(" .") or "fba"
+        stem = re.sub(r"[^\w. -]", "_", self.session.source.stem)[:60].strip(" .") or "fba"
         path, number = self.folder / f"{stem}{what}{suffix}", 2
         while path.exists():
             path, number = self.folder / f"{stem}{what}-{number}{suffix}", number + 1

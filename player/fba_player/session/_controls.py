@@ -76,7 +76,7 @@ class Controls:
                 self._held = "item"
             else:
                 self._held = "orbit" if button == "left" and not flat else "pan"
-            if button == "left" and self._at_wipe(x):
+            if button == "left" and self.at_wipe(x):
                 self._held = "wipe"
             self._may_click = button == "left"
 
@@ -127,7 +127,7 @@ class Controls:
         margin = BAR_MARGIN * self.session.scale
         return margin, max(self.session.size[0] - margin, margin + 1)
 
-    def _at_wipe(self, x: float) -> bool:
+    def at_wipe(self, x: float) -> bool:
         """Return whether a pixel is at the line between two figures that are compared."""
         scene = self.session.scene
         if not isinstance(scene, CompareScene) or scene.arrangement != "wipe":

@@ -72,8 +72,11 @@ class Exports:
         export.poll()
         if not export.finished:
             return
-        self.cancel()
-        if export.problem:
+        cancelled = export.cancelled
+        self.close()
+        if cancelled:
+            self._say("The export was cancelled; no file is left")
+        elif export.problem:
             self._say(f"Export failed: {export.problem}", "error", 10.0)
         else:
             self._say(f"Saved as {export.path}", seconds=8.0)
@@ -81,7 +84,12 @@ class Exports:
                 self._say(note, "warning", 8.0)
 
     def cancel(self) -> None:
-        """Stop it, without a file."""
+        """Let it stop, without a file, while the window goes on; `poll` says when it has."""
+        if self.now is not None:
+            self.now.cancel()
+
+    def close(self) -> None:
+        """Stop it, without a file, and wait for its end."""
         export, self.now = self.now, None
         self._rolling.discard("export")
         self._unsaved.discard(UNSAVED_EXPORT)

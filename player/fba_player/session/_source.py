@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time as wall
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fba.animation import Animation
@@ -72,6 +73,11 @@ class Source:
     def name(self) -> str:
         """Name of the file, else the title of the scene."""
         return os.path.basename(os.fspath(self.path)) if self.path is not None else self._scene.title
+
+    @property
+    def stem(self) -> str:
+        """What files that are made from it are called, without suffix; "one-other" where two are shown."""
+        return "-".join(Path(name).stem for name in self.name.split(" | ")) or "fba"
 
     @property
     def info(self) -> StreamInfo:

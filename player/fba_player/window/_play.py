@@ -88,8 +88,10 @@ def play(
     if not math.isfinite(audio_offset):
         raise ValueError(f"audio_offset must be a finite number of seconds, not {audio_offset}")
     with contextlib.ExitStack() as stack:
-        memory = Memory() if surface is not None else None
-        surface = surface or stack.enter_context(Surface(size))
+        if surface is None:
+            surface = stack.enter_context(Surface(size))
+        else:
+            surface.memory = Memory()
         if callable(animation):
             surface.open(title or "fba")
             animation = animation()
@@ -99,7 +101,7 @@ def play(
             Window(scene, title=title, size=size, camera=camera, loop=loop, source=source, surface=surface)
         )
         session, resumed = window.session, surface.resumed
-        session.memory, window.follows_file = memory, memory is not None
+        window.follows_file = session.memory is not None
         session.read = surface.read or session.read
         window.transport.set_speed(speed)
         window.transport.interpolate = interpolate
@@ -110,7 +112,8 @@ def play(
             window.transport.seek(start)
         if resumed is not None:
             _resume(session, resumed)
-        elif not paused:
+            paused = not resumed.playing
+        if window.update() and not paused:  # the first picture takes long: time begins when it is there
             window.transport.play()
         window.run()
         surface.resumed = _state(session) if session.resumes else None
@@ -172,8 +175,6 @@ def _resume(session: Session, state: Resumed) -> None:
         zoom.bound(transport.start, transport.end)
         zoom.zoom((high - low) / max(zoom.high - zoom.low, 1e-9), zoom.low)
         zoom.pan(low - zoom.low)
-    if state.playing:
-        transport.play()
     session.say(f"{session.source.name} has changed on disk, and is shown again", about="reload")
 
 

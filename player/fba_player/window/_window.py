@@ -81,6 +81,7 @@ class Window(Closing):
         self._owned = surface is None
         timeline = scene.timeline
         self.session = Session(scene, Transport(timeline, loop=loop), source=source, camera=camera, size=size)
+        self.session.memory = self._surface.memory
         self.captures = Captures(self.session, folder)
         self.pictures = 0
         self._title = title or scene.title or "fba"
@@ -206,7 +207,7 @@ class Window(Closing):
     def close(self) -> None:
         """Finish a film, close the window and release its resources; safe to call twice."""
         try:
-            self.session.exports.cancel()
+            self.session.exports.close()
             self.captures.close()
         finally:
             parts = (self._covering, self._gui, self._overlay, self._renderer, self._target, self._readback)

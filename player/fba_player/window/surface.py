@@ -22,6 +22,7 @@ from fba_player.view._font import label_font, shortened
 from fba_player.window._display import HOW_WITHOUT, start_glfw
 
 if TYPE_CHECKING:
+    from fba_player.session._memory import Memory
     from fba_player.view._camera import Camera
 
 OPENING_GREY = (118, 122, 127)
@@ -52,7 +53,7 @@ class Surface:
 
     size: width and height in points. There can be one at a time, in the main thread. It appears with `open`.
     resumed: what the next scene goes on with, None where it begins anew. read: reads a file that is opened
-    next, to see whether it can be shown; by default with `fba.read`.
+    next, to see whether it can be shown; by default with `fba.read`. memory: see `Session.memory`.
     """
 
     def __init__(self, size: tuple[int, int] = (1280, 720)) -> None:
@@ -61,6 +62,7 @@ class Surface:
         self.size = size
         self.resumed: Resumed | None = None
         self.read: Callable[[Path], object] | None = None
+        self.memory: Memory | None = None
         self.glfw: Any = None
         self.gl: Any = None
         self.window: Any = None

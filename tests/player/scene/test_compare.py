@@ -9,6 +9,8 @@ import pytest
 
 from fba.animation import Animation
 from fba_player.export._offscreen import Offscreen
+from fba_player.gl._annotation_renderer import LEGEND_MARGIN, NAME_SIZE, REFERENCE_HEIGHT
+from fba_player.gl._labels import legend_picture
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Transport
 from fba_player.scene._compare_timeline import CompareTimeline
@@ -16,6 +18,7 @@ from fba_player.scene._difference_colours import distances, round_up
 from fba_player.scene._differences import differences
 from fba_player.scene.compare import ROOTS, CompareScene
 from fba_player.scene.scene import Scene
+from fba_player.view._geometry import project
 from player_tracks import body_track, face_track
 
 
@@ -268,6 +271,20 @@ def test_colours_are_of_the_distance_from_the_first(pair: CompareScene) -> None:
         assert pair.view_at(0.04).faces[-1].shape is view.faces[-1].shape  # renderers keep what they know
     finally:
         pair.arrangement = "side"
+
+
+def test_names_stand_below_the_legend_of_colours(pair: CompareScene) -> None:
+    pair.arrangement = "colour"
+    try:
+        camera, size = pair.camera("front"), (1280, REFERENCE_HEIGHT)
+        extras = pair.view_at(0.1).extras
+    finally:
+        pair.arrangement = "side"
+    assert extras is not None
+    assert extras.legend is not None
+    low = LEGEND_MARGIN + legend_picture(extras.legend, 1.0).shape[0]
+    pixels = project(extras.dots[-1].positions.astype(float), camera.clip_matrix(size), size)[0]
+    assert pixels[:, 1].min() - 1.35 * NAME_SIZE > low  # a name is above its point
 
 
 def test_a_wipe_shows_each_on_its_side_of_the_line(pair: CompareScene) -> None:

@@ -122,11 +122,14 @@ def test_a_view_fits_again_where_the_bar_is_hidden(talking: Animation, clock: Cl
     assert viewpoint.camera == scene.camera("front", 1.6)
 
 
+@pytest.mark.parametrize("above", [0.0, 0.1])
 @pytest.mark.parametrize("preset", ["front", "three-quarter", "profile", "body", "side", "back", None])
-def test_views_fit_above_what_is_covered(talking: Animation, clock: Clock, preset: str | None) -> None:
+def test_views_fit_between_what_is_covered(
+    talking: Animation, clock: Clock, preset: str | None, above: float
+) -> None:
     scene = Scene(talking)
     viewpoint = Viewpoint(scene, 1.6, clock=clock)
-    viewpoint.covered = 0.25
+    viewpoint.covered, viewpoint.covered_above = 0.25, above
     camera, subject = viewpoint.fit(preset), scene.subject
     matrix = camera.projection_matrix(1.6) @ camera.view_matrix()
     ends = []
@@ -135,8 +138,8 @@ def test_views_fit_above_what_is_covered(talking: Animation, clock: Clock, prese
         clip = matrix @ np.array([x, y + side * subject.half_height, z, 1])
         ends.append(clip[1] / clip[3])
     assert ends[0] > -0.52  # the lowest quarter of -1..1 ends at -0.5
-    assert ends[1] < 1.02
-    assert ends[1] - ends[0] > 1.4
+    assert ends[1] < 1.02 - 2 * above
+    assert ends[1] - ends[0] > 1.4 - 2 * above
 
 
 def test_between_columns_the_face_stands_in_what_is_free(talking: Animation, clock: Clock) -> None:

@@ -19,7 +19,7 @@ from studio_hand import panel_of
 
 graphics.imported("imgui_bundle")
 
-from fba_player._ui.panels._differences_panel import DifferencesPanel, thin_curve  # noqa: E402 - needs imgui
+from fba_player._ui.panels._differences_panel import DifferencesPanel, _shown, thin_curve  # noqa: E402 - needs imgui
 from tools.window_picture import Studio  # noqa: E402
 
 SIZE = (900, 640)
@@ -58,6 +58,12 @@ def test_a_row_takes_to_where_the_difference_is_largest(studio: Studio) -> None:
     assert studio.session.transport.time == pytest.approx(0.2)
 
 
+def test_angles_are_shown_in_degrees() -> None:
+    factor, unit = _shown("1e-5 rad")
+    assert (round(factor * 174533, 2), unit) == (100.0, "deg")
+    assert _shown("MNS") == (1.0, "MNS")
+
+
 def test_it_is_there_only_where_something_is_compared(opengl: None) -> None:
     panel, alone = DifferencesPanel(), Scene(talk([0, 1]))
     assert not panel.available(Session(alone, Transport(alone.timeline)))
@@ -86,6 +92,18 @@ def test_curves_of_the_second_performance_are_shown_on_demand(studio: Studio) ->
     panel.which = 1
     studio.draw(4)
     assert panel._lanes[0].course.values.tolist() == [0, 10, 90, 30]
+
+
+def test_files_made_from_a_comparison_bear_both_names(studio: Studio) -> None:
+    assert studio.session.source.stem == "a-b"
+
+
+def test_the_mouse_shows_that_the_line_of_a_wipe_can_be_dragged(studio: Studio) -> None:
+    studio.session.scene.arrangement = "wipe"  # type: ignore[attr-defined]
+    for x, cursor in ((SIZE[0] / 2, "resize_ew"), (SIZE[0] / 4, "arrow")):
+        studio.gui.io.add_mouse_pos_event(x, 200.0)
+        studio.settle(3)
+        assert studio.gui.cursor == cursor
 
 
 def test_the_file_panel_describes_each_file(studio: Studio) -> None:

@@ -13,6 +13,7 @@ import graphics
 from fba.animation import Animation
 from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
+from fba_player.session._memory import Memory
 from fba_player.session._session import Session
 from fba_player.session._source import Source
 from fba_player.view.switches import Quality
@@ -181,6 +182,31 @@ def test_the_bar_hides_itself_while_playing_and_comes_back(studio: Studio, clock
     session.touched()
     studio.settle(30)
     assert studio.gui.shown == 1.0
+
+
+def test_the_first_window_keeps_its_bar_and_nothing_covers_the_hints(
+    studio: Studio, clock: Clock, tmp_path: Path
+) -> None:
+    session = studio.session
+    session.memory = Memory(tmp_path)
+    session.transport.loop = True
+    session.transport.play()
+    clock.now += 60
+    studio.settle(30)
+    assert studio.gui.shown == 1.0
+    session.transport.pause()
+    left, top, right, _ = studio.gui.bar.area
+    move(studio, left, top - 500)
+    row = slice(round(top) - 66, round(top) - 28)  # the strip of hints
+    strip = studio.draw(1)[row].astype(int)
+    move(studio, (left + right) / 2, top + 5)
+    session.say("a notice")
+    np.testing.assert_array_equal(studio.draw(2)[row], strip)
+    session.memory.welcome()
+    session.transport.play()
+    clock.now += 60
+    studio.settle(30)
+    assert studio.gui.shown == 0.0
 
 
 def test_recording_is_shown_while_the_bar_is_hidden(studio: Studio, clock: Clock) -> None:

@@ -21,7 +21,7 @@ MAX_CURVE_POINTS = 1500
 """Most points of a curve; longer ones are thinned to the largest value of each part."""
 ARRANGEMENTS = {"side": "beside", "over": "over", "colour": "in colour", "wipe": "wipe"}
 ROOT_TEXTS = {"own": "own places", "common": "one place"}
-DEGREES = 180 / np.pi * 1e-5
+DEGREES = float(np.degrees(1e-5))
 
 
 class DifferencesPanel(Panel):
@@ -85,7 +85,8 @@ class DifferencesPanel(Panel):
                 self._chosen = (item.kind, item.number)
                 session.transport.seek(item.time)
             tooltip(f"{item.kind.upper()} {item.number}: shows its course, and goes to where it differs most")
-            for text in (f"{item.most:.0f}", f"{item.rms:.1f}", _unit(item.unit, item.most)):
+            factor, unit = _shown(item.unit)
+            for text in (f"{item.most * factor:.{_digits(unit)}f}", f"{item.rms * factor:.1f}", unit):
                 imgui.table_next_column()
                 imgui.text_colored(theme.TEXT if chosen else theme.FAINT, text)
         imgui.end_table()
@@ -94,7 +95,7 @@ class DifferencesPanel(Panel):
         key = (differences, self._chosen)
         if self._curve is None or self._curve[0] != key:
             table = differences.faps if chosen.kind == "fap" else differences.baps
-            values = table[:, chosen.number - 1].astype(np.float64)
+            values = table[:, chosen.number - 1].astype(np.float64) * _shown(chosen.unit)[0]
             self._curve = (key, *thin_curve(differences.times, values, MAX_CURVE_POINTS))
         _, times, values = self._curve
         imgui.dummy((0, 2))
@@ -118,7 +119,8 @@ class DifferencesPanel(Panel):
             implot.end_plot()
         implot.pop_style_color(2)
         now = float(np.interp(session.transport.time, times, values))
-        imgui.text_colored(theme.FAINT, f"now {now:+.0f} {_unit(chosen.unit, now)}")
+        unit = _shown(chosen.unit)[1]
+        imgui.text_colored(theme.FAINT, f"now {now:+.{_digits(unit)}f} {unit}")
 
 
 def _why_nothing_differs(scene: Any, second: int, differences: Differences) -> str:
@@ -140,8 +142,13 @@ def thin_curve(times: Float64, values: Float64, most: int) -> tuple[Float64, Flo
     return times[rows], values[rows]
 
 
-def _unit(unit: str, amount: float) -> str:
-    return f"1e-5 rad ({abs(amount) * DEGREES:.1f} deg)" if unit == "1e-5 rad" else unit
+def _shown(unit: str) -> tuple[float, str]:
+    """Return the factor on amounts of a unit as they are shown, and the name of what they are then."""
+    return (DEGREES, "deg") if unit == "1e-5 rad" else (1.0, unit)
+
+
+def _digits(unit: str) -> int:
+    return 1 if unit == "deg" else 0
 
 
 def _short(name: str, most: int = 22) -> str:

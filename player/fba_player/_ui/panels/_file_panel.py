@@ -18,7 +18,7 @@ from fba_player.session._session import Session
 class FilePanel(Panel):
     """Name, format, frames, rate, bits, planes, masks and warnings."""
 
-    name, title, label = "file", "File", "File"
+    name, title, label = "file", "Contents of the file", "Info"
     side = "left"
     width, height, fitted, least = 330.0, 430.0, True, 170.0
 

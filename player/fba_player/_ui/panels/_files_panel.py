@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ KINDS = {
 FACE_KINDS, BODY_KINDS = (".fap",), (".bvh", ".bap")
 """Suffixes of files that hold a face or a body alone."""
 SIZES = ("as the window", "640 x 360", "1280 x 720", "1920 x 1080", "3840 x 2160")
+HERE = os.path.join(os.curdir, "")
+"""Where a dialog begins: dialogs of Linux would else show the files that other programs used last."""
 BROWSE_WIDTH = 86.0
 """Points beside a name for its button."""
 
@@ -29,7 +32,7 @@ BROWSE_WIDTH = 86.0
 class FilesPanel(Panel):
     """The name of a file to open; and name, kind, size and part of an export, and how far it is."""
 
-    name, title, label = "files", "Open and export", "Export"
+    name, title, label = "files", "Open and export", "File"
     width, height, fitted, least = 340.0, 330.0, True, 200.0
 
     def __init__(self) -> None:
@@ -71,7 +74,7 @@ class FilesPanel(Panel):
         marked = transport.mark_in is not None or transport.mark_out is not None
         if marked and suffix != ".png":
             _, self._marked = imgui.checkbox("between the marks", self._marked)
-        proposed = Path((session.source.name or "fba").replace(" | ", "-")).stem + suffix
+        proposed = session.source.stem + suffix
         self._exported, entered = self._name("export", self._exported, proposed)
         if session.exports.now is None:
             if self._button("Export file") or entered:
@@ -81,14 +84,12 @@ class FilesPanel(Panel):
                 options = self._options(session, part=part, suffix=path.suffix.lower())
                 session.exports.begin(path, options, replace=self._exported == self._replaced != "")
         else:
+            export = session.exports.now
             if self._button("Cancel export"):
                 session.exports.cancel()
-                session.say("The export was cancelled")
-            export = session.exports.now
-            if export is not None:
-                imgui.same_line()
-                text = f"{export.done} of {export.total}" if export.total else "preparing"
-                imgui.progress_bar(export.share, (-1, 0), text)
+            imgui.same_line()
+            text = f"{export.done} of {export.total}" if export.total else "preparing"
+            imgui.progress_bar(export.share, (-1, 0), "stopping" if export.cancelled else text)
         if not has_dialogs():
             wrapped(NO_DIALOGS, theme.FAINT)
 
@@ -152,7 +153,9 @@ class FilesPanel(Panel):
         from imgui_bundle import portable_file_dialogs as dialogs
 
         if self._dialog is None:
-            asked = dialogs.open_file("Open") if what == "open" else dialogs.save_file("Export as", hint)
+            asked = (
+                dialogs.open_file("Open", HERE) if what == "open" else dialogs.save_file("Export as", hint)
+            )
             self._dialog = (what, asked)
 
     def _take_answer(self, session: Session) -> None:

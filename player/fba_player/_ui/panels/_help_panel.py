@@ -11,12 +11,12 @@ from fba_player.session._session import Session
 
 MIN_COLUMN_WIDTH = 296.0
 """Least width of a column in points."""
-KEY_WIDTH = 104.0
-"""Width of the keys in a column, in points."""
+KEY_WIDTH = 124.0
+"""Largest width of the keys in a column, in points."""
 COLUMNS = {
     2: (("Play", "Save", "Window"), ("View", "Switches", "Mouse")),
     3: (("Play",), ("View", "Switches", "Save"), ("Window", "Mouse")),
-    4: (("Play",), ("View", "Switches", "Save"), ("Window",), ("Mouse",)),
+    4: (("Play",), ("View", "Switches"), ("Window", "Save"), ("Mouse",)),
 }
 """Groups in each column, by the number of columns."""
 
@@ -26,7 +26,7 @@ class HelpPanel(Panel):
 
     name, title, label = "help", "Keys and mouse", "Help"
     side = "middle"
-    width, height = 1240.0, 520.0
+    width, height, fitted = 1240.0, 520.0, True
 
     def draw(self, session: Session) -> None:
         groups = _groups(session)
@@ -60,7 +60,8 @@ def _group(name: str, rows: list[tuple[str, str]]) -> None:
         return
     heading(name)
     imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit)
-    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, KEY_WIDTH)
+    wide = min(max(imgui.calc_text_size(key).x for key, _ in rows), KEY_WIDTH)
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, wide)
     imgui.table_setup_column("does", imgui.TableColumnFlags_.width_stretch)
     for key, does in rows:
         imgui.table_next_row()

@@ -23,7 +23,7 @@ class ViewPanel(Panel):
     """Each switch of the scene as a tick, a list of choices, or a list of FAPs."""
 
     name, title, label = "view", "View", "View"
-    width, height, fitted, least = 300.0, 430.0, True, 190.0
+    width, height, fitted, least = 300.0, 620.0, True, 190.0
 
     def draw(self, session: Session) -> None:
         scene = session.scene
@@ -65,7 +65,7 @@ class CameraPanel(Panel):
     """Presets, angles, distance, and whether the camera follows the figure."""
 
     name, title, label = "camera", "Camera", "Camera"
-    width, height, fitted, least = 300.0, 320.0, True, 180.0
+    width, height, fitted, least = 300.0, 470.0, True, 180.0
 
     def draw(self, session: Session) -> None:
         viewpoint = session.viewpoint
