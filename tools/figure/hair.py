@@ -35,13 +35,14 @@ RADIUS = 0.1
 """Of the ball onto which places on the scalp are carried for their strands, metres."""
 VOLUMES = (
     # a place on the left, and how far around it, metres
-    ((0.062, 0.088, -0.085), (0.030, 0.030, 0.075)),
     ((0.0, 0.090, -0.020), (0.055, 0.030, 0.030)),
     ((0.0, 0.030, -0.185), (0.060, 0.045, 0.040)),
 )  # fmt: skip
-"""Where hair is thicker or thinner than elsewhere: at the edges of the top, above the forehead, behind."""
+"""Where hair is thicker than elsewhere: above the forehead, behind."""
 DEEPEST = -0.008
 """Least thickness: the skull is flatter at its corners than hair lets it look, metres."""
+EARS = (0.0795, 0.008)
+"""Farther from the middle, and lower, than this (m) there are ears, over which no hair is painted."""
 AXIS = -0.085
 """z of the vertical axis around which the angles of the hairline are measured."""
 
@@ -56,10 +57,10 @@ PROFILES = np.array([[-0.32, -0.10, 0.0, 0.06, 0.12, 0.16], [-0.30, 0.05, 0.2, 0
 """How much brighter a strand is from its root to its tip: of straight and of curly hair."""
 DARKEST, BRIGHTEST = -1.4, 1.4
 """Tones at the ends of what a picture holds."""
-DEEP = (-0.9, -0.45)
+DEEP = (-0.7, -0.35)
 """Tones between strands of straight and of curly hair."""
-REACH, SCALE, SOFT = 3.25, 900, 1.8
-"""Extent of `strand_places` away from the parting, pixels to a unit of them, and pixels by which they are blurred."""
+REACH, SCALE, SOFT = 3.25, 900, 2.0
+"""Extent of `strand_places` away from the parting; pixels to a unit of them; pixels of blur."""
 SPARSER = 16
 """One of so many points is enough to tell where locks grow."""
 
@@ -68,9 +69,9 @@ SPARSER = 16
 class Locks:
     """Painted locks of hair, N of them, from the lowest to the topmost.
 
-    roots: places as of `strand_places`. lengths, widths: metres. headings: radians from the strand through the
-    root; bends: from root to tip. tones: how
-    bright. fullness: 0 where hair is short and sparse, 1 where it is full.
+    roots: places as of `strand_places`. lengths, widths: metres. headings: radians between the lock's root
+    and the line through it of `strand_places`; bends: from root to tip. tones: how bright. fullness: 0 where
+    hair is short and sparse, 1 where it is full.
     """
 
     roots: Complex128
@@ -137,12 +138,10 @@ def scalp(positions: Float64, edge_width: float = 0.004) -> Float64:
     return smoothstep(height_above_hairline(positions) / edge_width + 0.5)
 
 
-def noise(positions: Float64, scale: float, seed: int, order: int = 1) -> Float64:
-    """Return (N,) noise in -1..1 at points (N, 3). scale: size of its grains, metres; order: of splines."""
-    from scipy.ndimage import gaussian_filter, map_coordinates
-
+def noise(positions: Float64, scale: float, seed: int) -> Float64:
+    """Return (N,) noise in -1..1 at points (N, 3). scale: size of its grains, metres."""
     lattice = np.random.default_rng(seed).uniform(-1, 1, (48, 48, 48))
-    return map_coordinates(lattice, (positions / scale).T, order=order, mode="grid-wrap")
+    return map_coordinates(lattice, (positions / scale).T, order=1, mode="grid-wrap")
 
 
 def strand_places(p: Float64) -> Complex128:
@@ -181,23 +180,22 @@ def paint_locks(p: Float64, hair: Hair) -> tuple[Float64, Float64]:
     at = np.stack([places.real, places.imag + np.pi]) * SCALE
     drawn, cover = (map_coordinates(values, at, order=1) for values in picture)
     # Between strands one sees deep into full hair, but the skin where it is sparse.
-    inside = smoothstep((above - 0.002) / 0.010)
-    tone = (drawn + (1 - cover) * inside * DEEP[int(hair.curly)]) / np.maximum(
-        cover + (1 - cover) * inside, 0.02
-    )
-    parting = np.zeros(len(p))
+    gaps = (1 - cover) * smoothstep((above - 0.002) / 0.010)
+    cover = cover + gaps
+    tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
     if not hair.curly:
         # Light from above glances off the strands where they turn down.
         rise = unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69)
         shine = np.exp(-(((rise - 0.74) / 0.14) ** 2))
         tone = tone * (1 + 0.3 * shine) + 0.40 * shine
-        away = places.real * _metres(places) + 0.0008 * noise(p, 0.004, 67)
-        parting = np.exp(-((np.maximum(away, 0) / 0.0013) ** 2))
-    return tone, np.maximum(cover, inside) * (1 - 0.32 * parting)
+        away = places.real * _metres(places) + 0.0011 * noise(p, 0.004, 67)
+        cover *= 1 - 0.27 * np.exp(-((np.maximum(away, 0) / 0.0013) ** 2))
+    ears = (np.abs(p[:, 0]) > EARS[0]) & (p[:, 1] < EARS[1])
+    return tone, np.where(ears, 0.0, cover)
 
 
 def _metres(places: Complex128) -> Float64:
-    """Return (N,) how many metres of the head a unit of `strand_places` is there, the same in all directions."""
+    """Return (N,) how many metres of the head a unit of `strand_places` is, the same in all directions."""
     focus = _map_axes()[3]
     steep = np.maximum(np.abs(np.sinh(places)), 0.03)
     return 2 * RADIUS * focus * steep / (1 + np.abs(focus * np.cosh(places)) ** 2)
@@ -219,22 +217,19 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
     count = len(roots)
     long = smoothstep((unit(places - MIDDLE)[:, 1] - 0.1) / 0.7)
     full = smoothstep(height / 0.020)
-    length = (0.005 + full * (0.011 + 0.022 * long)) * random.uniform(0.7, 1.2, count)
-    width = (0.0040 + 0.0016 * full * long) * random.uniform(0.7, 1.3, count)
-    heading, bend = (
-        random.normal(0, 0.1, count),
-        random.normal(0, 0.16, count) + 0.35 * noise(places, 0.020, 62),
-    )
-    tone = random.normal(0, 0.20, count) + 0.2 * noise(places, 0.016, 63)
-    order = -roots.real * (1 + 0.06 * random.normal(size=count))
+    normal, uniform = random.normal, random.uniform
+    tone = normal(0, 0.20, count) + 0.2 * noise(places, 0.016, 63)
     if hair.curly:
-        length, width = random.uniform(0.005, 0.009, count), random.uniform(0.0009, 0.0020, count)
-        heading, bend = (
-            random.uniform(-np.pi, np.pi, count),
-            random.choice((-1, 1), count) * random.uniform(2.5, 5.5, count),
-        )
-        tone = 0.7 * tone + 0.16 * noise(places, 0.0042, 64)
-        order = tone
+        length, width = uniform(0.005, 0.009, count), uniform(0.0009, 0.0020, count)
+        heading = uniform(-np.pi, np.pi, count)
+        bend = uniform(2.5, 5.5, count) * random.choice((-1, 1), count)
+        order = tone = 0.7 * tone + 0.12 * noise(places, 0.0042, 64)
+    else:
+        length = (0.005 + full * (0.011 + 0.022 * long)) * uniform(0.7, 1.2, count)
+        width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
+        heading, bend = normal(0, 0.1, count), normal(0, 0.16, count) + 0.35 * noise(places, 0.020, 62)
+        tone += 0.3 * (1 - full)
+        order = -roots.real * (1 + 0.06 * normal(size=count))
     order = np.argsort(order)
     return Locks(*(values[order] for values in (roots, length, width, heading, bend, tone, full)))
 
@@ -242,20 +237,21 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
 def _draw_locks(locks: Locks, hair: Hair) -> tuple[Float64, Float64]:
     """Return two pictures on the plane of `strand_places`: tones times how much is covered, and the latter.
 
-    The strands of a lock run together towards its tip. Locks lie like tiles, those nearer to the parting on top.
+    The strands of a lock run together towards its tip. Straight locks lie like tiles, those nearer to the
+    parting on top; of curls, the bright ones do.
     """
     random = np.random.default_rng(62)
     each = np.repeat(np.arange(len(locks.roots)), STRANDS)
     full, length = locks.fullness[each], locks.lengths[each] * random.uniform(0.65, 1.1, len(each))
     across = random.uniform(-1, 1, len(each))
     tone = locks.tones[each] - 0.35 * across**2 + random.normal(0, 0.17, len(each))
-    at, path, widths = locks.roots[each], [], []
+    path, widths, at = [], [], locks.roots[each]
     at = at + (1 - full) * random.uniform(-0.006, 0.006, len(each)) / _metres(at)
     side = 1j * across * locks.widths[each] / 2
     for share in np.linspace(0, 1, SEGMENTS + 1):
         metres, heading = _metres(at), np.exp(1j * (locks.headings + locks.bends * share))[each]
         path.append(at + side * (1 - 0.7 * full * share**1.5) * heading / metres)
-        widths.append(WIDTH * (0.35 + 0.65 * full) * (1.05 - share) ** 0.5 / metres)
+        widths.append(WIDTH * (0.55 + 0.45 * full) * (1.05 - share) ** 0.5 / metres)
         at = at + length / SEGMENTS / metres * heading
     size = int(2 * np.pi * SCALE) + 2, int(REACH * SCALE) + 2
     picture = Image.new("L", size)

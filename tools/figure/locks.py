@@ -1,4 +1,4 @@
-"""Locks that stand out from the layer of hair: narrow strips that hide its edge and break its outline."""
+"""Locks that stand out from the layer of hair: narrow strips that break its outline."""
 
 from __future__ import annotations
 
@@ -33,9 +33,11 @@ def locks(bare: Float64, grown: Float64, triangles: Integer, hair: Hair) -> Mesh
         roots = _roots(bare, triangles, name, heights, count, random)
         length = random.uniform(*lengths, count)
         bend = random.normal(0.0, 0.10, count) + 0.30 * noise(roots, 0.012, 92)  # neighbours alike
+        lifts = lift * random.uniform(0.3, 1.3, count) * hair.loose
         if hair.curly:
             bend, length = np.sign(bend) * random.uniform(1.4, 3.0, count), length * 0.40
-        paths = _paths(roots, length, bend, lift * random.uniform(0.3, 1.3, count) * hair.loose, depth)
+            lifts = -lifts if name == "front" else lifts  # hidden: single curls would look like scratches
+        paths = _paths(roots, length, bend, lifts, depth)
         blades += [_blade(path, width * random.uniform(0.6, 1.3)) for path in paths]
         colours += list(_colours(random.normal(0.15, 0.20, count)))
     pattern = blade_triangles(SEGMENTS)
@@ -80,7 +82,7 @@ def _roots(
     above = height_above_hairline(points)
     fits = (above > heights[0]) & (above < heights[1])
     if group == "front":
-        fits &= (points[:, 2] > -0.055) & (points[:, 1] > 0.035)
+        fits &= (points[:, 2] > -0.055) & (points[:, 1] > 0.060)
     return points[fits][:count]
 
 
@@ -112,6 +114,6 @@ def _blade(path: Float64, width: float) -> Float64:
 
 
 def _colours(tones: Float64) -> Float64:
-    """Return (N, 4) linear light and gloss of locks; tones: as of `hair.strand_tone`."""
+    """Return (N, 4) linear light and gloss of locks; tones: as of `hair.paint_locks`."""
     shown = np.stack([np.interp(tones, TONES, [c[k] for c in ALEX.hair.colours]) for k in range(3)], axis=1)
     return np.concatenate([(shown / 255) ** 2.2, np.full((len(tones), 1), GLOSS)], axis=1)

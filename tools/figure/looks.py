@@ -25,7 +25,7 @@ class Hair:
 
     sides: float
     top: float
-    volumes: tuple[float, float, float]
+    volumes: tuple[float, float]
     rise: float
     lumps: float
     loose: float
@@ -65,7 +65,7 @@ class Looks:
 ALEX = Looks(
     name="alex",
     hair=Hair(
-        0.0050, 0.0120, (0.000, 0.006, 0.001), 0.027, 0.0011, 1.0, curly=False,
+        0.0050, 0.0120, (0.006, 0.001), 0.027, 0.0011, 1.0, curly=False,
         colours=((30, 21, 17), (54, 38, 29), (84, 60, 44), (122, 90, 66)),
     ),
     skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
@@ -76,7 +76,7 @@ ALEX = Looks(
 RUTH = Looks(
     name="ruth",
     hair=Hair(
-        0.012, 0.010, (0.000, 0.002, 0.000), 0.055, 0.0022, 1.3, curly=True,
+        0.012, 0.010, (0.002, 0.000), 0.055, 0.0022, 1.3, curly=True,
         colours=((52, 48, 47), (88, 84, 82), (136, 133, 131), (184, 182, 180)),
     ),
     skin=(128, 86, 66), blush=(132, 76, 62), socket=(94, 60, 48), neck=(120, 80, 61),

@@ -99,6 +99,7 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     colour = _lines(colour, p, looks)
     colour = _eyes(colour, p, ring_eye, looks)
     colour = _mouth(colour, p, ring_mouth, lip_side, looks)
+    colour = _ears(colour, p)
     colour = _hair(colour, p, looks)
     colour = _blend(colour, np.array(looks.brow), 0.22 * brow(p, looks.brow_height)[1])
     image = np.zeros((*chart.known.shape, 3))
@@ -190,10 +191,7 @@ def _lines(colour: Float64, p: Float64, looks: Looks) -> Float64:
     y = p[:, 1] * 1000 + 1.1 * noise(p, 0.0055, 23) + 0.35 * noise(p, 0.0018, 24)
     front = smoothstep((p[:, 2] + 0.045) / 0.02) * (0.72 + 0.45 * noise(p, 0.0045, 25))
     for points, width, depth in LINES:
-        knots = np.array(points, dtype=np.float64)
-        run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
-        fine = np.linspace(0, run[-1], 60)
-        path = np.stack([PchipInterpolator(run, knots[:, axis])(fine) for axis in range(2)], axis=1)
+        path = _path(points)
         near = (np.abs(x - path[:, 0].mean()) < 40) & (np.abs(y - path[:, 1].mean()) < 40) & (front > 0)
         distance, row = cKDTree(path).query(np.stack([x[near], y[near]], axis=1))
         fade = np.sin(np.pi * np.clip(row / 59, 0.02, 0.98)) ** 0.6 * front[near] * depth * looks.lines
@@ -202,6 +200,39 @@ def _lines(colour: Float64, p: Float64, looks: Looks) -> Float64:
         factor = 1 - 0.26 * fade * np.exp(-((distance / (1.25 * width)) ** 2)) + 0.07 * fade * light
         colour[near] *= factor[:, None]
     return colour
+
+
+EARS = (
+    # points (z, y) of a fold of the ear, mm; its half width, mm; and how much darker it is, 0..1
+    (((-89, -1), (-96, -1), (-101, -6), (-102.5, -16), (-100, -25), (-96, -32)), 1.5, 0.30),  # scapha
+    (((-88, -5), (-92, -5), (-96, -8)), 2.2, 0.19),  # triangular fossa
+    (((-93, -2), (-97, -8), (-98.5, -15), (-96.5, -24), (-92, -30)), 1.3, -0.12),  # antihelix
+    (((-86, -9), (-91, -9), (-96, -12)), 1.0, -0.07),  # its lower crus
+    (((-88, -17), (-92, -20), (-91, -26), (-86, -29)), 4.0, 0.24),  # concha
+    (((-83, -15), (-82, -20), (-83, -26)), 1.6, 0.30),  # behind the tragus
+    (((-85, -30), (-87, -32)), 1.6, 0.16),  # below it
+)
+"""Folds of the left ear that the surface only hints at."""
+
+
+def _ears(colour: Float64, p: Float64) -> Float64:
+    """Return the colour with the folds of the ears; what is darker is redder."""
+    x, y, z = np.abs(p[:, 0]), p[:, 1], p[:, 2]
+    near = (x > 0.073) & (np.abs(y + 0.02) < 0.03) & (np.abs(z + 0.094) < 0.018)
+    places, factor = 1000 * p[near][:, [2, 1]], np.ones((int(near.sum()), 3))
+    for points, width, depth in EARS:
+        distance, row = cKDTree(_path(points)).query(places)
+        fade = np.sin(np.pi * np.clip((row + 5) / 69, 0, 1)) ** 0.5
+        factor -= (depth * fade * np.exp(-((distance / width) ** 2)))[:, None] * (0.8, 1.05, 1.1)
+    colour[near] *= factor
+    return colour
+
+
+def _path(points: tuple[tuple[float, float], ...]) -> Float64:
+    """Return (60, 2) points along the smooth line through given ones."""
+    knots = np.array(points, dtype=np.float64)
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
+    return PchipInterpolator(run, knots)(np.linspace(0, run[-1], 60))
 
 
 def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
