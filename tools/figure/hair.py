@@ -57,7 +57,7 @@ PROFILES = np.array([[-0.32, -0.10, 0.0, 0.06, 0.12, 0.16], [-0.30, 0.05, 0.2, 0
 """How much brighter a strand is from its root to its tip: of straight and of curly hair."""
 DARKEST, BRIGHTEST = -1.4, 1.4
 """Tones at the ends of what a picture holds."""
-DEEP = (-0.9, -0.35)
+DEEP = (-0.7, -0.35)
 """Tones between strands of straight and of curly hair."""
 REACH, SCALE, SOFT = 3.25, 900, 2.0
 """Extent of `strand_places` away from the parting; pixels to a unit of them; pixels of blur."""
@@ -189,7 +189,7 @@ def paint_locks(p: Float64, hair: Hair) -> tuple[Float64, Float64]:
         shine = np.exp(-(((rise - 0.74) / 0.14) ** 2))
         tone = tone * (1 + 0.3 * shine) + 0.40 * shine
         away = places.real * _metres(places) + 0.0011 * noise(p, 0.004, 67)
-        cover *= 1 - 0.22 * np.exp(-((np.maximum(away, 0) / 0.0013) ** 2))
+        cover *= 1 - 0.27 * np.exp(-((np.maximum(away, 0) / 0.0013) ** 2))
     ears = (np.abs(p[:, 0]) > EARS[0]) & (p[:, 1] < EARS[1])
     return tone, np.where(ears, 0.0, cover)
 

@@ -82,7 +82,7 @@ def _roots(
     above = height_above_hairline(points)
     fits = (above > heights[0]) & (above < heights[1])
     if group == "front":
-        fits &= (points[:, 2] > -0.055) & (points[:, 1] > 0.035)
+        fits &= (points[:, 2] > -0.055) & (points[:, 1] > 0.060)
     return points[fits][:count]
 
 
