@@ -17,12 +17,11 @@ from fba.body import BodyModel
 from fba.errors import FbaError, LimitError
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.outlines._distance import project
+from fba.outlines._distance import outline_distances, project
 from fba.outlines._figure import Figure, read_poses
 from fba.outlines._index_file import CANVAS, Stored, Stream, pack_mask, read_index, unpack_mask, write_index
 from fba.outlines._mask import fit_mask
 from fba.outlines._methods import describe_points
-from fba.outlines._overlap import outline_distances
 from fba.outlines._raster import View, draw_silhouette
 from fba.outlines._search import follow, nearest
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, bap_angles

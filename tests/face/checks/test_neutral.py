@@ -9,8 +9,7 @@ import pytest
 
 from fba.face._tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.checks._findings import Finding
-from fba.face.checks._locations import check_locations
-from fba.face.checks._neutral import check_neutral
+from fba.face.checks._neutral import check_locations, check_neutral
 from fba.face.eyeball import eyeballs, pupil_diameter, sphere
 from fba.face.feature_points import MIRRORED
 from fba.face.model import FaceModel, Part

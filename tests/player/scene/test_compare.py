@@ -12,9 +12,8 @@ from fba_player.export._offscreen import Offscreen
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Transport
 from fba_player.scene._compare_timeline import CompareTimeline
-from fba_player.scene._difference_colours import distances, round_up
 from fba_player.scene._differences import differences
-from fba_player.scene.compare import ROOTS, CompareScene
+from fba_player.scene.compare import ROOTS, CompareScene, distances, round_up
 from fba_player.scene.scene import Scene
 from player_tracks import body_track, face_track
 

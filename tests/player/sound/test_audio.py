@@ -18,8 +18,7 @@ from fba.errors import FbaWarning, FormatError
 from fba_player.playback._playhead import Motion
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Transport
-from fba_player.sound._player import Audio, find_sound_beside, open_audio
-from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
+from fba_player.sound._player import Audio, SoundBlocks, find_sound_beside, open_audio, samples_ahead
 from player_tracks import face_track
 
 av = pytest.importorskip("av")
