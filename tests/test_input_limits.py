@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import fba
-from fba import Animation, FaceTrack, LimitError, Limits
+from fba import Animation, FaceTrack, Limits
+from fba.errors import LimitError
 from fba.cli.main import main
 
 

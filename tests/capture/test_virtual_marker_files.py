@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from fba.capture.virtual_markers import MarkerMapping, VirtualMarker, read_mapping, write_mapping
+from fba.capture.virtual_markers import MarkerMapping, VirtualMarker
+from fba.capture.virtual_markers._mapping_files import read_mapping, write_mapping
 from fba.capture.virtual_markers.mapping import MadeFor
 from fba.errors import FormatError
 

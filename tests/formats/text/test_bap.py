@@ -59,14 +59,14 @@ def test_errors_name_the_bap(tmp_path: Path) -> None:
 
 @settings(max_examples=40)
 @given(animations(face=False, body=True))
-def test_written_files_read_back_unchanged(animation) -> None:  # type: ignore[no-untyped-def]
+def test_written_bap_files_read_back_unchanged(animation) -> None:  # type: ignore[no-untyped-def]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.bap"
         write_bap(path, animation)
         assert read_bap(path) == animation
 
 
-def test_every_real_file_reads_and_writes_back(shared: Path, tmp_path: Path) -> None:
+def test_every_real_bap_file_reads_and_writes_back(shared: Path, tmp_path: Path) -> None:
     paths = [path for path in shared.rglob("*") if path.suffix.lower() == ".bap"]
     assert len(paths) >= 100
     for path in paths:
