@@ -7,7 +7,7 @@ import pytest
 import fba
 from fba.body import ROOT
 from fba.capture.joint_maps import change_map, find_map, read_map, write_map
-from fba.capture import SkeletonMotion
+from fba.capture.motion import SkeletonMotion
 from fba.errors import FormatError, LimitError, OptionError
 from fba.formats.bvh._reader import parse
 

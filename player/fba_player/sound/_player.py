@@ -27,8 +27,7 @@ from fba.atomic import PathLike
 from fba.audio import CHANNELS, SoundFile
 from fba.errors import FbaError, FbaWarning
 from fba_player.gl._context import cure
-from fba_player.playback._playhead import Motion
-from fba_player.playback._transport import Transport
+from fba_player.playback._transport import Motion, Transport
 from fba_player.sound._mixer import SoundMixer
 from fba_player.sound.soundtrack import find_sound_beside
 from fba_player.view.protocols import Closing

@@ -15,9 +15,8 @@ import pytest
 from fba.animation import Animation
 from fba.audio import SoundFile
 from fba.errors import FbaWarning, FormatError
-from fba_player.playback._playhead import Motion
 from fba_player.playback._timeline import Timeline
-from fba_player.playback._transport import Transport
+from fba_player.playback._transport import Motion, Transport
 from fba_player.sound._player import Audio, SoundBlocks, find_sound_beside, open_audio, samples_ahead
 from player_tracks import face_track
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba_player.playback._playhead import Motion
 from fba_player.playback._timeline import Timeline
-from fba_player.playback._transport import Transport
+from fba_player.playback._transport import Motion, Transport
 from fba_player.sound._mixer import FADE_SECONDS, SoundMixer
 from player_tracks import face_track
 
