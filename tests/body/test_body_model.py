@@ -3,8 +3,6 @@
 And what the official glTF validator says of files.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -3,8 +3,6 @@
 The default skeleton, and skeletons that must be refused.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

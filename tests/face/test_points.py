@@ -3,8 +3,6 @@
 The neutral face: its units, its symmetry, and the standard's rules for it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -3,8 +3,6 @@
 Names of shapes: spellings of ARKit's blendshapes, and FAPs.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Animations and a virtual display for tests."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

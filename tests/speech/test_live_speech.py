@@ -1,7 +1,5 @@
 """Speech while it is spoken: frames depend on no more than 0.3 s behind them, whatever the pieces are."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import shutil

@@ -3,8 +3,6 @@
 Phones in ARPAbet and IPA, the visemes that they show, and the words of texts.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import sys

@@ -3,7 +3,7 @@
 Time follows the wall clock, or that of the sound, times the speed, however often a picture is drawn: a slow
 machine shows fewer pictures, never slower motion.
 
-Picture and sound share a `Playhead`, which gives the time of an animation at any reading of a clock.
+Picture and sound share a `Motion`, which gives the time of an animation at any reading of a clock.
 """
 
 from __future__ import annotations

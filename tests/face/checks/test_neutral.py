@@ -1,7 +1,5 @@
 """The neutral face of the standard: what keeps its rules passes, and each rule is found when broken."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 Faces in fewer bytes.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

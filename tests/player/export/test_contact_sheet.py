@@ -3,8 +3,6 @@
 Sheets of a performance's frames.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

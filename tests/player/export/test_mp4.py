@@ -3,8 +3,6 @@
 Turns of threads while a film is encoded.
 """
 
-from __future__ import annotations
-
 import sys
 import wave
 from fractions import Fraction

@@ -3,8 +3,6 @@
 What stands still is still in pictures, and what moves slowly changes them evenly.
 """
 
-from __future__ import annotations
-
 import builtins
 import sys
 from typing import Any

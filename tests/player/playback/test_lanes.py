@@ -3,8 +3,6 @@
 The lane of expressions that are felt: where they begin and end on the timeline, and what is left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

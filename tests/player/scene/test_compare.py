@@ -1,7 +1,5 @@
 """Several performances in one picture, and by how much they differ."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

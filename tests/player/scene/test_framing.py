@@ -1,7 +1,5 @@
 """Where a moving body takes place: what a camera has to have in view, and when it follows."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

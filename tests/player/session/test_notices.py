@@ -3,8 +3,6 @@
 What windows remember, and that a damaged memory is no harm.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

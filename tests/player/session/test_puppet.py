@@ -3,8 +3,6 @@
 What the puppeteer's sliders are: every FAP once, the body within human limits, left and right mirrored.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

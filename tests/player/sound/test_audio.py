@@ -1,7 +1,5 @@
 """Audio files of all sorts, and a whole player of sound on a device that nobody hears."""
 
-from __future__ import annotations
-
 import time
 import tracemalloc
 import warnings

@@ -1,7 +1,5 @@
 """What a device is given, from where the performance is: the sound itself says which sample it is."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -3,8 +3,6 @@
 Bit rates of a stream.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 

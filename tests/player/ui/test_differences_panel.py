@@ -1,7 +1,5 @@
 """The panel of differences, drawn into memory."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """The panels over the picture, drawn into memory; the mouse is imgui's own queue of events."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The puppeteer's moods: the plane, the sliders, and that a path over the plane becomes a take."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Curves, bit rate and puppeteer, drawn into memory and used with imgui's own mouse."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
