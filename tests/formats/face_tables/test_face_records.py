@@ -19,6 +19,7 @@ from fba.formats.face_tables import _livelink_csv as tables
 from fba.formats.face_tables import _shapes_json as shapes_json
 from fba.formats.face_tables import ifacialmocap
 from fba.formats.face_tables import livelink_udp as packets
+from format_files import saved
 from tools.captures.face_files import (
     STEP,
     beat,
@@ -46,12 +47,6 @@ def check(motion: ShapeMotion, *, tolerance: float = 1e-6, but: tuple[str, ...] 
         if camel(name) not in but:
             found = motion.weights[:, motion.names.index(camel(name))]
             np.testing.assert_allclose(found, expected, atol=tolerance)
-
-
-def saved(folder: Path, data: bytes | str, name: str) -> Path:
-    path = folder / name
-    path.write_bytes(data if isinstance(data, bytes) else data.encode())
-    return path
 
 
 @pytest.mark.parametrize("name", ["a.udp", "a.bin", "a"])

@@ -83,11 +83,6 @@ def studio(opengl: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clock:
         yield studio
 
 
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
 def place(studio: Studio, name: str) -> tuple[float, float]:
     """Where the plane shows a named emotion, in points."""
     left, top, right, bottom = panel_of(studio, "puppet").emotion.plane

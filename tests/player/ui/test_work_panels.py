@@ -24,11 +24,6 @@ from tools.window_picture import Studio  # noqa: E402 - needs imgui
 SIZE = (1000, 640)
 
 
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
 Opened = Callable[..., Studio]
 
 
