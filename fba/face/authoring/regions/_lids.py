@@ -35,6 +35,7 @@ from fba.face.model import Part
 from fba.mesh import read_pixels
 from fba.sampling import smoothstep
 
+# Lashes or a liner that are painted on a lid, see `painted_width`:
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Shares of red, green and blue (ITU-R BT.709)."""
 GAMMA = 2.2
@@ -51,6 +52,7 @@ BRIGHT_SHARE = 0.7
 """Brightness, as a share of that of the skin beside, above which paint ends."""
 SAMPLES = 12
 """Points across each edge of a triangle at which its colour is read."""
+# How a lid moves:
 STEP = 128
 """FAP units between two borders of the tables: an eighth of the motion from open to closed."""
 REACH = 0.6

@@ -32,6 +32,7 @@ from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.parameters import faps
 from fba.sampling import smoothstep
 
+# What a smile does beside moving the corners of the mouth:
 STRETCHING = (6, 7, 53, 54)
 RAISING = {12: 1.0, 59: 1.0, 13: -1.0, 60: -1.0}
 """Side of the corner that each FAP raises."""
@@ -50,6 +51,7 @@ SMILE_NEAR, SMILE_REACH = 0.54, 0.78
 """Distances from the corner of the mouth between which all that fades out, in ES0."""
 FOLD_OUTWARD = 0.09
 """Distance of the fold outside of the line from nose to mouth, in ES0."""
+# The handles:
 HANDLES = {
     "left corner": ("2.4", "8.3"),
     "upper left": ("2.6", "8.5"),
