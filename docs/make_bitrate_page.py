@@ -11,8 +11,15 @@ from bench.bitrate import Result, make_pictures, read_results, summary_lines
 from bench.bitrate.choices import OWN, best_within, compare, group_results, rivals_of, smallest_live, together
 from bench.bitrate.page import make_section, method_text
 from bench.bitrate.points import KNOWN, UNPLANNED
-from bench.bitrate.summary import LIMITS, subjects_text
-from bench.bitrate.tables import comparison_table, error_text, published_table, rate_text, settings_table
+from bench.bitrate.tables import (
+    LIMITS,
+    comparison_table,
+    error_text,
+    published_table,
+    rate_text,
+    settings_table,
+    subjects_text,
+)
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "bench" / "results"

@@ -7,7 +7,7 @@ from bench.bitrate.measurement import measure
 from bench.bitrate.page import make_page, make_pictures
 from bench.bitrate.results import Result, read_results, results_csv
 from bench.bitrate.subjects import Subject, split_subjects
-from bench.bitrate.summary import summary_lines
+from bench.bitrate.tables import summary_lines
 
 __all__ = [
     "Result",

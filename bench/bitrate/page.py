@@ -10,7 +10,7 @@ from bench.bitrate import plots, tables
 from bench.bitrate.choices import best_within, compare, group_results
 from bench.bitrate.results import EVERYTHING, Result
 from bench.bitrate.subjects import BODY, FACE
-from bench.bitrate.summary import LIMITS, subjects_text, summary_lines
+from bench.bitrate.tables import LIMITS, subjects_text, summary_lines
 
 NAMES = {FACE: "faces", BODY: "bodies"}
 MEASURE = {

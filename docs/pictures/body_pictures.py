@@ -1,4 +1,4 @@
-"""Pictures of docs/body-models.md.
+"""Pictures of docs/body-models.md, and sheets of frames of recordings, for docs/play.md and the README.
 
 The clips are real recordings, read from the shared material (FBA_SHARED, else ../shared beside the checkout).
 """
@@ -13,8 +13,10 @@ from PIL import Image
 
 import fba
 from fba import Animation, BodyTrack, player
+from fba.arrays import UInt8
 from fba.body import gait
 from fba.parameters import baps
+from fba_player.export.film_sheet import film_sheet
 
 SHARED = Path(os.environ.get("FBA_SHARED") or Path(__file__).parents[3] / "shared")
 CLIPS = (
@@ -126,3 +128,22 @@ def twists() -> Image.Image:
             picture = Image.fromarray(view.frame(float(frame))).convert("RGB")
             sheet.paste(picture, (0, 170 * frame))
     return sheet
+
+
+def expressions_sheet() -> UInt8:
+    """An old FAP file that shows all expressions."""
+    return _sheet("data/ist/ALLEXPS.FAP", "three-quarter")
+
+
+def angry_sheet() -> UInt8:
+    """A stream of somebody angry."""
+    return _sheet("vectors/real/angry_1.fba", "three-quarter")
+
+
+def dance_sheet() -> UInt8:
+    """Motion capture of a dancer."""
+    return _sheet("data/greta/Dance.bvh", "body")
+
+
+def _sheet(name: str, camera: str) -> UInt8:
+    return film_sheet(player.Scene(fba.read(SHARED / name)), 8, camera=camera)

@@ -1,14 +1,17 @@
-"""Pictures of docs/emotion.md."""
+"""Pictures of docs/emotion.md: expressions, their measures, and one performance in six moods."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
 
+import fba
 from fba import Animation, FaceTrack, emotion
-from fba.arrays import Float32
+from fba.arrays import Float32, UInt8
+from fba.emotion import Mood, emote
 from fba_player.export._offscreen import Offscreen
 from fba_player.export._sheet_layout import FAINT, PAPER, TEXT, lay_out
 from fba_player.export.contact_sheet import close_up
@@ -16,6 +19,11 @@ from fba_player.scene.scene import Scene
 from fba_player.view._camera import Camera
 from fba_player.view._font import label_font
 
+SAMPLE = Path(fba.__file__).with_name("samples") / "hello.fap"
+MOODS = {"neutral": 0, "angry": 90, "surprised": 80, "sad": 90, "sleepy": 90, "happy": 80}
+MOMENTS = (1.0, 2.8, 4.0, 7.6)
+"""Seconds of the sample that are shown, one below the other."""
+MOOD_TILE = 210
 YAW = 10.0
 """Degrees: a head turned a little shows brows and cheeks better, and what is one-sided."""
 COLUMNS, TILE = 7, 240
@@ -88,3 +96,13 @@ def mixtures() -> Image.Image:
     point = emotion.expression_at(5.0, 4.4)
     tiles.append(("--at 5.0,4.4", str(point).replace("_", " "), point.faps))
     return sheet(tiles, len(tiles))
+
+
+def moods() -> UInt8:
+    animation = fba.read(SAMPLE)
+    columns = []
+    for name, intensity in MOODS.items():
+        scene = Scene(emote(animation, [Mood(name, intensity)]))
+        with Offscreen(scene, (MOOD_TILE, MOOD_TILE), samples=4) as view:
+            columns.append(np.concatenate([view.frame(time)[..., :3] for time in MOMENTS]))
+    return np.concatenate(columns, axis=1)

@@ -1,4 +1,4 @@
-"""Curves of docs/gait.md.
+"""Curves and picture of docs/gait.md.
 
 Hip, knee and ankle of the normal walk beside the means and deviations that Winter measured, and the height of
 the pelvis.
@@ -10,9 +10,16 @@ import csv
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
+from fba import player
 from fba.body import BapSolver, Skeleton, gait
+from fba_player.view._camera import Camera
 
+WALKS = Path(__file__).parents[1] / "images" / "gait.jpg"
+PHASES = 8
+SIZE = (160, 270)
+CAMERA = Camera(target=(0.0, 0.87, 0.03), yaw=78.0, pitch=2.0, distance=5.2)
 ROOT = Path(__file__).parents[2]
 MEASURED = ROOT / "tests" / "body" / "gait" / "winter_natural_cadence.csv"
 TARGET = Path(__file__).parents[1] / "images" / "gait_curves.svg"
@@ -109,3 +116,18 @@ def main() -> None:
         + "\n".join([*panels, legend]) + "\n</svg>\n",
         encoding="utf-8", newline="\n",
     )  # fmt: skip
+
+
+def cycle_row(character: str) -> np.ndarray:
+    """One cycle of a character, side by side: the four poses, then those of the other half."""
+    walk = gait.walk(character=character, cycles=1, in_place=True, rate=60)
+    with player.Offscreen(player.Scene(walk), SIZE, CAMERA, samples=4) as view:
+        cycle = float((len(walk) - 1) / walk.rate)
+        return np.hstack([view.frame(cycle * n / PHASES)[..., :3].copy() for n in range(PHASES)])
+
+
+def walks() -> None:
+    """Draw a cycle of each character."""
+    WALKS.parent.mkdir(exist_ok=True)
+    rows = np.vstack([cycle_row(character) for character in gait.characters()])
+    Image.fromarray(rows).save(WALKS, quality=88, optimize=True)

@@ -5,8 +5,7 @@ Nothing here knows faces, streams or devices. PyAV is imported where a file is o
 
 from fba.audio._mono import find_duration, read_mono
 from fba.audio._pipe import RATES, Pipe, read_pipe
-from fba.audio._pyav import av_version, import_av
-from fba.audio._sound_file import CHANNELS, SoundFile, open_sound
+from fba.audio._sound_file import CHANNELS, SoundFile, av_version, import_av, open_sound
 
 __all__ = [
     "CHANNELS",

@@ -1,4 +1,7 @@
-"""Any part of an audio file, decoded when it is read, so that long files need little memory."""
+"""Any part of an audio file, decoded when it is read, so that long files need little memory.
+
+PyAV decodes it, from version 12 on, which also encodes films (`import_av`).
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,7 @@ import numpy as np
 
 from fba.arrays import Int16
 from fba.atomic import PathLike
-from fba.audio._pyav import av_version, import_av
-from fba.errors import FormatError, warn
+from fba.errors import DisplayError, FormatError, warn
 
 CHANNELS = 2
 PLAYABLE_RATES = (8000, 192_000)
@@ -237,3 +239,20 @@ class _Converter:
     def _new_resampler(self) -> Any:
         layout = "mono" if self._sides == 1 else "stereo"
         return self._av.AudioResampler(format="s16", layout=layout, rate=self._rate)
+
+
+def import_av(purpose: str = "films need") -> Any:
+    """Return the module `av`; DisplayError without it. purpose: the beginning of its message."""
+    try:
+        import av
+    except ImportError as error:
+        raise DisplayError(
+            f"{purpose} the Python package av (PyAV), which cannot be imported: {error}. "
+            'Install it with: pip install "mpeg4-fba[films]"'
+        ) from error
+    return av
+
+
+def av_version(av: Any) -> int:
+    """Return the major version of PyAV."""
+    return int(av.__version__.split(".")[0])

@@ -1,4 +1,7 @@
-"""`write_mp4`: whole files, for playing while they load, and fragmented ones, for streaming."""
+"""`write_mp4`: whole files, for playing while they load, and fragmented ones, for streaming.
+
+Both may have a `SoundTrack`.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -21,11 +25,30 @@ from fba.carriage._descriptors import (
     write_esds,
 )
 from fba.carriage._samples import PlaneSamples, split_samples
-from fba.carriage._sound import SoundTrack
 from fba.carriage._tracks import ORIGINAL_UUID
 from fba.errors import UnsupportedError
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.parameters import BapTable
+
+
+@dataclass(frozen=True, eq=False)
+class SoundTrack:
+    """Coded sound.
+
+    coding: "aac" (ISO/IEC 14496-3) or "opus" (RFC 6716). configuration: AudioSpecificConfig, or the
+    identification header of Opus in Ogg (RFC 7845, 5.1). rate: ticks a second, of the samples of AAC, 48000
+    for Opus. channels: their number. packets: the frames. durations: int64 (N,), ticks of each. skipped:
+    ticks at the beginning that decoders leave out.
+    """
+
+    coding: Literal["aac", "opus"]
+    configuration: bytes
+    rate: int
+    channels: int
+    packets: tuple[bytes, ...]
+    durations: Int64
+    skipped: int = 0
+
 
 MOVIE_SCALE = 90_000
 """Ticks a second of the movie: a multiple of the usual frame rates."""

@@ -13,9 +13,8 @@ import numpy as np
 from fba.carriage._boxes import Box, top_boxes
 from fba.carriage._sample_tables import Defaults, Fragments, SampleTable, read_tables
 from fba.carriage._samples import PlaneSamples, join_samples, split_samples
-from fba.carriage._sound import SoundTrack
 from fba.carriage._tracks import Mp4Track, choose_track, read_tracks
-from fba.carriage._writer import write_mp4, write_sound
+from fba.carriage._writer import SoundTrack, write_mp4, write_sound
 from fba.errors import FormatError, warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path

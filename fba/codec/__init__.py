@@ -8,7 +8,6 @@ from fba.codec._decoder import Decoder, decode
 from fba.codec._encoder import ClampedParameter, Encoder, EncoderStatistics, encode_animation
 from fba.codec._frame_buffers import DecodedFrames, FrameBuffer
 from fba.codec._plane.pricing import NextPlane
-from fba.codec._plane_start import PlaneStart, read_plane_start, replace_time_code
 from fba.codec._quantisation import (
     coarsest_quantisers,
     count_rounded,
@@ -18,7 +17,14 @@ from fba.codec._quantisation import (
     range_limit,
     step_scale,
 )
-from fba.codec._recoding import StreamPlanes, read_planes, recode
+from fba.codec._recoding import (
+    PlaneStart,
+    StreamPlanes,
+    read_plane_start,
+    read_planes,
+    recode,
+    replace_time_code,
+)
 from fba.codec._script import encode_planes
 from fba.codec._stream.clock import time_code
 from fba.codec._stream.damage import Damage

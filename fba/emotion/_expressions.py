@@ -12,8 +12,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float32
 from fba.emotion._expression import FAMILIES, Expression, whissel_points
-from fba.emotion._mixing import mix
-from fba.emotion._rules import Rules, limited
+from fba.emotion._rules import Rules, limited, mix
 from fba.errors import OptionError, did_you_mean
 from fba.face import Definitions
 from fba.parameters import EXPRESSIONS, FAP_COUNT, fap_numbers, fill_from_mates

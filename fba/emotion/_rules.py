@@ -1,5 +1,7 @@
 """The two rules for mixing expressions: within a family, and of different families.
 
+`mix` applies the first to each family, then the second to the families.
+
 Section 8.4 of the thesis in docs/emotion.md, which gives no numbers; here they are parameters.
 """
 
@@ -13,11 +15,11 @@ from functools import cache
 import numpy as np
 
 from fba.arrays import Bool, Float32, Float64, Floating
-from fba.emotion._expression import Expression
+from fba.emotion._expression import NEUTRAL_POINT, Expression, whissel_points
 from fba.emotion._profiles import measurements, vocabulary
 from fba.errors import OptionError
 from fba.face import Definitions
-from fba.parameters import FAP_COUNT, faps
+from fba.parameters import EXPRESSIONS, FAP_COUNT, faps
 from fba.sampling import smoothstep
 
 MIN_ACTIVATION = 2.0
@@ -196,3 +198,39 @@ def fap_limits() -> tuple[Float64, Float64]:
         [[float(fap.step)] for fap in faps()]
     )
     return limits[:, 0], limits[:, 1]
+
+
+def mix(weights: Sequence[tuple[Expression, float]], rules: Rules) -> Float32:
+    """Return the FAPs of expressions at intensities of 0 to 100, within the limits of the standard: (68,)."""
+    families: dict[str, Part] = {}
+    for expression, intensity in weights:
+        if not intensity:
+            continue
+        new = part(expression, intensity / 100, activation_of(expression), rules.presence)
+        key = expression.family or expression.name
+        if key in families:
+            new = mix_within_family(families[key], new, _centre(expression), rules)
+        families[key] = new
+    if not families:
+        return np.zeros(FAP_COUNT, dtype=np.float32)
+    return limited(mix_families(list(families.values()), rules))
+
+
+def activation_of(expression: Expression) -> float | None:
+    """Return the activation of an expression, or else of its family; None without either."""
+    if expression.activation is not None:
+        return expression.activation
+    return whissel_points()[expression.family][0] if expression.family else None
+
+
+def point_of(expression: Expression) -> tuple[float, float]:
+    """Return activation and evaluation of an expression, or else of its family, or of neutral."""
+    if expression.point is not None:
+        return expression.point
+    return whissel_points()[expression.family] if expression.family else NEUTRAL_POINT
+
+
+def _centre(expression: Expression) -> Float64:
+    select = EXPRESSIONS.index(expression.family)
+    centre: Float64 = Definitions.default().expressions[select].astype(np.float64)
+    return centre

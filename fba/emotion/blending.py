@@ -11,8 +11,7 @@ import numpy as np
 from fba.arrays import Float32, Int16
 from fba.emotion._expression import NEUTRAL_POINT, Expression
 from fba.emotion._expressions import expression
-from fba.emotion._mixing import mix, point_of
-from fba.emotion._rules import Rules
+from fba.emotion._rules import Rules, mix, point_of
 from fba.errors import OptionError
 from fba.parameters import INTENSITY_MAX
 

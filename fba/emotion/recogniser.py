@@ -20,7 +20,7 @@ from fba.arrays import Bool, Float64, Intp
 from fba.emotion._expression import FAMILIES, NEUTRAL_POINT
 from fba.emotion._expressions import expression
 from fba.emotion._likelihood import INTENSITIES, PRIORS, candidates, model
-from fba.emotion._mixing import point_of
+from fba.emotion._rules import point_of
 from fba.errors import OptionError
 from fba.parameters import FAP_COUNT, fap_numbers
 

@@ -11,17 +11,14 @@ Emotional facial animation by motion capture, chapter 4 (thesis, Bilkent Univers
 bodies, which it draws itself, without OpenGL.
 """
 
-from fba.outlines._distance import earth_movers_distance, lower_bounds
+from fba.outlines._distance import earth_movers_distance, lower_bounds, outline_distances
 from fba.outlines._figure import Figure
-from fba.outlines._index import Choice, Hit, Index, build_index
+from fba.outlines._index import Choice, Hit, Index, build_index, follow, nearest
 from fba.outlines._mask import fit_mask, read_mask
 from fba.outlines._methods import Method, methods
-from fba.outlines._overlap import outline_distances
 from fba.outlines._raster import View, draw_silhouette
-from fba.outlines._search import follow, nearest
 from fba.outlines._sheet import draw_sheet
-from fba.outlines._skeleton import Nodes, find_nodes
-from fba.outlines._tree import Tree, build_tree, embed_l1, embed_l2
+from fba.outlines._tree import Nodes, Tree, build_tree, embed_l1, embed_l2, find_nodes
 
 __all__ = [
     "Choice",

@@ -1,4 +1,7 @@
-"""`Index`: silhouettes of performances, drawn from many sides, in which an outline is found again."""
+"""`Index`: silhouettes of performances, drawn from many sides, in which an outline is found again.
+
+Searches find the nearest of many silhouettes, exactly (`nearest`), and the likeliest sequence (`follow`).
+"""
 
 from __future__ import annotations
 
@@ -12,19 +15,17 @@ from itertools import pairwise
 import numpy as np
 
 from fba.animation import Animation
-from fba.arrays import Bool, Float32, Float64, Int32, Int64, UInt8
+from fba.arrays import Bool, Float32, Float64, Floating, Int32, Int64, UInt8
 from fba.body import BodyModel
 from fba.errors import FbaError, LimitError
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.outlines._distance import project
+from fba.outlines._distance import Ground, earth_movers_distance, lower_bounds, outline_distances, project
 from fba.outlines._figure import Figure, read_poses
 from fba.outlines._index_file import CANVAS, Stored, Stream, pack_mask, read_index, unpack_mask, write_index
 from fba.outlines._mask import fit_mask
 from fba.outlines._methods import describe_points
-from fba.outlines._overlap import outline_distances
 from fba.outlines._raster import View, draw_silhouette
-from fba.outlines._search import follow, nearest
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, bap_angles
 from fba.tracks import BodyTrack, FaceTrack
 
@@ -261,3 +262,58 @@ def _stream(name: str, animation: Animation) -> Stream:
 def _apart(yaws: Float64, yaw: Float64 | float) -> Float64:
     """Return the angles between sides, degrees, 0 to 180."""
     return np.asarray(np.abs((yaws - yaw + 180) % 360 - 180))
+
+
+def nearest(
+    query: Floating,
+    descriptions: Float32,
+    count: int,
+    *,
+    projected: Float32 | None = None,
+    ground: Ground = "cityblock",
+    prune: bool = True,
+) -> tuple[Int64, Float64, int]:
+    """Return the numbers (count,) of the nearest descriptions, the nearest first, and their distances.
+
+    query: (N, D). descriptions: (S, N, D), of equal mass. projected: (S, D, N), `project` of these, where it
+    is at hand. prune: leave out what lower bounds exclude, which changes no result. The third result is the
+    number of distances that were computed.
+    """
+    total = len(descriptions)
+    bounds = np.zeros(total)
+    if prune:
+        bounds = lower_bounds(
+            project(query), project(descriptions) if projected is None else projected, ground
+        )
+    found: list[tuple[float, int]] = []
+    compared = 0
+    for number in np.argsort(bounds, kind="stable").tolist():
+        # Bounds of float32 projections may exceed the distance by rounding.
+        if len(found) == count and bounds[number] > found[-1][0] * (1 + 1e-5) + 1e-6:
+            break
+        distance = earth_movers_distance(query, descriptions[number], ground)
+        compared += 1
+        found = sorted([*found, (distance, number)])[:count]
+    return (
+        np.array([number for _, number in found], dtype=np.int64),
+        np.array([distance for distance, _ in found]),
+        compared,
+    )
+
+
+def follow(costs: Sequence[Floating], steps: Sequence[Floating]) -> list[int]:
+    """Return the choice for each picture that costs least over all (Viterbi's algorithm).
+
+    costs: (K,) for each picture, of its choices. steps: (K, L) from each picture to the next, the cost of
+    going from a choice to another.
+    """
+    best = np.asarray(costs[0], dtype=np.float64)
+    came: list[Int64] = []
+    for cost, step in zip(costs[1:], steps, strict=True):
+        over = best[:, None] + step
+        came.append(over.argmin(axis=0))
+        best = over.min(axis=0) + cost
+    chosen = [int(best.argmin())]
+    for before in reversed(came):
+        chosen.append(int(before[chosen[-1]]))
+    return chosen[::-1]

@@ -10,8 +10,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Int64
 from fba.outlines._distance import Ground, sample
-from fba.outlines._skeleton import Nodes, find_nodes
-from fba.outlines._tree import Tree, build_tree, embed_l1, embed_l2, split_into_paths
+from fba.outlines._tree import Nodes, Tree, build_tree, embed_l1, embed_l2, find_nodes, split_into_paths
 
 SAMPLES = 64
 """Points of equal mass by which the nodes of a silhouette are described."""

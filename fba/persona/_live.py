@@ -14,11 +14,11 @@ from fba.persona._persona import Persona
 from fba.persona._rest import NEUTRAL_FRAMES
 from fba.persona._restyle import Follower, keep_shut
 from fba.persona.motion import flatten, unflatten
-from fba.persona.points._registration import MAX_MISFIT, MAX_TURN, register_points
+from fba.persona.points._tracked import MAX_MISFIT, MAX_TURN, register_points
 from fba.persona.points.layout import PARTS, TRACKED, VERTICES, flat_mask, part_vertices
 from fba.persona.recognition import ClassRecogniser, decide
-from fba.persona.recognition._component import displacements
 from fba.persona.recognition._faps import face_scale, mask_faps, measure_fapu
+from fba.persona.recognition._recogniser import displacements
 
 
 class LivePersona:

@@ -11,8 +11,7 @@ from fba.speech._pieces import RATE
 from fba.speech._prosody import Prosody
 from fba.speech._sounds import Phone, Shape, Speech, Word, find_shapes
 from fba.speech._text import split_text
-from fba.speech._timings import find_timings, read_timings
-from fba.speech._viseme_files import VisemeFormat, format_visemes
+from fba.speech._timings import VisemeFormat, find_timings, format_visemes, read_timings
 from fba.speech._visemes import read_shapes
 from fba.speech._voices import speak_text
 

@@ -1,4 +1,7 @@
-"""Timings of speech that other programs make: which sound or mouth shape is when."""
+"""Timings of speech that other programs make: which sound or mouth shape is when.
+
+`format_visemes` writes them for other programs: JSON with Oculus' names, and Praat's TextGrid.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,10 @@ import csv
 import json
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -18,6 +22,7 @@ from fba.errors import FormatError
 from fba.face import Definitions
 from fba.source import naming_file, open_source
 from fba.speech._mouth_cues import (
+    OCULUS,
     Entry,
     parse_events,
     parse_moho,
@@ -27,8 +32,11 @@ from fba.speech._mouth_cues import (
     parse_rhubarb_tsv,
     parse_rhubarb_xml,
 )
-from fba.speech._sounds import SILENCE, Phone, Speech, find_sound
+from fba.speech._sounds import SILENCE, Phone, Shape, Speech, find_sound
 
+_NAMES = {number: name for name, number in reversed(OCULUS.items())}
+
+VisemeFormat = Literal["json", "textgrid"]
 MOST_BYTES = 1 << 26
 """Largest file of timings."""
 MOST_HEADER = 4096
@@ -270,3 +278,30 @@ _KINDS: tuple[tuple[str, Callable[[str], bool], Callable[[str], list[Entry]]], .
     ),
     ("CTM", _is_ctm, _parse_ctm),
 )
+
+
+def format_visemes(shapes: Sequence[Shape], kind: VisemeFormat) -> str:
+    """Return visemes as the text of a file, which `read_timings` reads.
+
+    json: times in seconds, names of Oculus' lip sync, MPEG-4's numbers, and the share of the shape, 0 to 1.
+    textgrid: an interval tier "phones" with a phone in ARPAbet that shows each viseme, empty for none.
+    """
+    if kind == "json":
+        events = [
+            {
+                "time": round(each.start, 4),
+                "end": round(each.end, 4),
+                "viseme": _NAMES[each.viseme],
+                "number": each.viseme,
+                "share": round(each.size, 3),
+            }
+            for each in shapes
+        ]
+        return json.dumps({"visemes": events}, indent=1) + "\n"
+    end = shapes[-1].end if shapes else 0.0
+    lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "0", f"{end:g}", "<exists>", "1"]
+    lines += ['"IntervalTier"', '"phones"', "0", f"{end:g}", str(len(shapes))]
+    for each in shapes:
+        name = PHONES[each.viseme] if each.viseme else ""
+        lines += [f"{each.start:.4f}", f"{each.end:.4f}", f'"{name}"']
+    return "\n".join(lines) + "\n"

@@ -1,6 +1,7 @@
-"""Body models: what is checked, files, damaged files, and the built-in person."""
+"""Body models: what is checked, files, damaged files, and the built-in person.
 
-from __future__ import annotations
+And what the official glTF validator says of files.
+"""
 
 import json
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from fba.gltf._document import join_container, parse_document, split_container
 from fba.gltf._reader import read_document
 from fba.gltf._surfaces import surfaces
 from fba.parameters import joints
+from gltf_validator import assert_valid
 from json_places import REMOVED, put
 from small_bodies import random_pose, rod
 
@@ -301,3 +303,9 @@ def test_vertices_without_joints() -> None:
     assert binary is not None
     with pytest.raises(ModelError, match=r"parts\[0\]: its vertices have no joints"):
         read_body(parse_document(join_container(json.dumps(root).encode(), bytes(binary)), "rod.glb"))
+
+
+@pytest.mark.parametrize("which", ["small", "built-in"])
+def test_the_validator_finds_no_fault(tmp_path: Path, which: str) -> None:
+    (rod() if which == "small" else BodyModel.default()).save(tmp_path / "a.glb")
+    assert_valid(tmp_path / "a.glb", informs={"UNSUPPORTED_EXTENSION", "UNUSED_OBJECT"})

@@ -1,7 +1,5 @@
 """Simplified bodies: skin weights are carried along, and joints move what is left."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hands are kept outside the body where it is shown, smoothly, and other bodies are not harmed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

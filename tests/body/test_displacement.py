@@ -1,7 +1,5 @@
 """How far two motions of a body are apart, against distances worked out by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A face on a body: one skin with it, the head turned on its skull base."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Does a decoded body move like a person, and would the other table of BAP steps fit it better."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from dataclasses import replace

@@ -8,12 +8,12 @@ import pytest
 import fba
 from fba import Animation, FaceTrack
 from fba.codec import EncoderOptions, FrameRate, TimeCode
+from fba.codec._frame_buffers import TimeBase
 from fba.codec._plane import slots
 from fba.codec._plane.loops import SKIP_MAX
 from fba.codec._ranges import Ranges
 from fba.codec._runs import mask_types
 from fba.codec._stream.clock import StreamClock, time_code
-from fba.codec._time_base import TimeBase
 from fba.errors import RangeError
 
 NTSC = Fraction(30000, 1001)

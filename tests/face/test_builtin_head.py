@@ -1,7 +1,5 @@
 """The built-in head: an adult's proportions, the standard's neutral face, made by the scripts beside it."""
 
-from __future__ import annotations
-
 import csv
 import io
 import subprocess

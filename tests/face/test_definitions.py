@@ -1,7 +1,5 @@
 """The built-in visemes and expressions: what phonetics and measured faces say about each."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

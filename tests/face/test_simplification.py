@@ -1,7 +1,5 @@
 """Simplified faces: what they carry, how they move, and levels of detail in files."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

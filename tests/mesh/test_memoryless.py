@@ -1,7 +1,5 @@
 """Memoryless collapses: volume, borders, seams, pinned vertices, history; and bad meshes."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

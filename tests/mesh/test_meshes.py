@@ -1,7 +1,5 @@
 """What face and body models share: parts counted through, and the arrays that vertices are written to."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

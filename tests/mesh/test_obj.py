@@ -1,7 +1,5 @@
 """OBJ files: all ways to write a face, and all ways to break one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

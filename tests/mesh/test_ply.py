@@ -1,7 +1,5 @@
 """PLY files: ASCII and both byte orders, and damage."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

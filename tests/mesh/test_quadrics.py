@@ -1,7 +1,5 @@
 """Coarser meshes: fewer triangles of the same vertices, on the same surface; chosen by size on the screen."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -13,7 +13,7 @@ from fba.arrays import Bool
 from fba.errors import FbaWarning, FormatError, LimitError
 from fba.outlines import find_nodes, fit_mask, outline_distances, read_mask
 from fba.outlines._index_file import pack_mask, unpack_mask
-from fba.outlines._skeleton import medial_axis
+from fba.outlines._tree import medial_axis
 
 Draw = Callable[..., Path]
 

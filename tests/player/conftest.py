@@ -1,7 +1,5 @@
 """Animations and a virtual display for tests."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -13,6 +11,7 @@ import pytest
 import graphics
 from fba.animation import Animation
 from player_tracks import body_track, face_track
+from set_clock import Clock
 
 
 @pytest.fixture(scope="session")
@@ -28,6 +27,11 @@ def walking() -> Animation:
     bodies = [{32: 9000 * t, 8: 5000 * t, 11: -8000 * t} for t in range(10)]
     faces = [{48: 2000 * t} for t in range(10)]
     return Animation(25, np.arange(10), face_track(faces), body_track(bodies), "walking")  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,5 @@
 """An `Offscreen` holds its memory, draws any size, anywhere, and says clearly what it cannot do."""
 
-from __future__ import annotations
-
 import gc
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Bodies with a head of their own in a scene: no face is put on them, FAPs turn their heads."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Words and phones in sound: what flite speaks is found where flite says that it is."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import shutil

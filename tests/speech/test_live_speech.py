@@ -1,7 +1,5 @@
 """Speech while it is spoken: frames depend on no more than 0.3 s behind them, whatever the pieces are."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import shutil
@@ -19,7 +17,7 @@ from fba.audio import read_mono
 from fba.errors import OptionError, UnsupportedError
 from fba.parameters import fap_numbers
 from fba.speech import RATE, LiveSpeech, find_shapes
-from speech_sounds import babble
+from sound_clicks import babble
 
 DELAY = 0.26
 """Seconds, the piece of 0.02 s that the sound is heard in among them."""

@@ -1,7 +1,5 @@
 """Speech in streams: lips close, sounds keep their places, both codings keep their bit rates, faces live."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

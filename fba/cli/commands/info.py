@@ -157,8 +157,7 @@ def _report_face(
 def _trace(path: Path, reading: Reading, *, as_json: bool, values: bool) -> None:
     import json
 
-    from fba_conformance.listing import element_dict, format_trace
-    from fba_conformance.trace import trace
+    from fba_conformance.trace import element_dict, format_trace, trace
 
     with input_file(path) as file:
         data = read_stream(file, reading)

@@ -1,10 +1,15 @@
-"""Containers of the Avatar Representation Format as ZIP archives: names and rest pose of joints, shapes."""
+"""Containers of the Avatar Representation Format as ZIP archives: names and rest pose of joints, shapes.
+
+In streams that no container explains, numbers of shapes and joints have the meaning of `FACE_PROFILE` and
+`BODY_PROFILE`, profiles of this project.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -12,12 +17,19 @@ import numpy as np
 
 from fba import rotations
 from fba.arrays import Float64, Int64, to_float64
+from fba.body import Skeleton
 from fba.carriage.avatar_units import begins_stream
 from fba.errors import FormatError
 from fba.formats.zip_files import read_members
 from fba.limits import Limits
 from fba.source import Path
 
+FACE_PROFILE = "arkit-face"
+"""Shapes are ARKit's 52 in ARKit's order."""
+BODY_PROFILE = "mpeg4-body"
+"""Joints are those of `Skeleton.default()` in its order, in metres; behind them come `FACE_JOINTS`."""
+FACE_JOINTS = ("head", "left_eye", "right_eye")
+"""Joints in the place of skullbase, whose children they are, turned by FAPs 48 to 50 and 23 to 26."""
 DOCUMENT = "arf.json"
 FLOAT32 = 5126
 """Component type of dense tensors of floats, as in glTF."""
@@ -147,3 +159,26 @@ def parents_first(parents: Int64) -> list[int]:
         reached = np.where(reached >= 0, parents[reached], -1)
     order: list[int] = np.argsort(depth, kind="stable").tolist()
     return order
+
+
+@cache
+def joint_names() -> tuple[str, ...]:
+    """Return the names of the joints of `BODY_PROFILE`."""
+    return (*Skeleton.default().names, *FACE_JOINTS)
+
+
+@cache
+def joint_parents() -> Int64:
+    """Return the numbers of their parents, -1 for the root."""
+    skeleton = Skeleton.default()
+    return np.append(skeleton.parents, [skeleton.number("skullbase")] * len(FACE_JOINTS))
+
+
+@cache
+def resting_joints() -> Float64:
+    """Return float64 (J, 4, 4): the places of these joints in the world in the default posture, unturned."""
+    centres = Skeleton.default().centres
+    placed = np.tile(np.eye(4), (len(joint_names()), 1, 1))
+    placed[: len(centres), :3, 3] = centres
+    placed[len(centres) :, :3, 3] = centres[joint_parents()[-1]]
+    return placed

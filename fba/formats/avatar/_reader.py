@@ -24,13 +24,16 @@ from fba.capture.blendshapes.conversion import convert_rows
 from fba.carriage.avatar_units import AvatarUnits, UnitTrack, begins_stream, read_units
 from fba.errors import FormatError, warn
 from fba.face import arkit_names
-from fba.formats.avatar._container import DOCUMENT, Avatar, parents_first, read_container
-from fba.formats.avatar._names import (
+from fba.formats.avatar._container import (
     BODY_PROFILE,
+    DOCUMENT,
     FACE_JOINTS,
     FACE_PROFILE,
+    Avatar,
     joint_names,
     joint_parents,
+    parents_first,
+    read_container,
     resting_joints,
 )
 from fba.formats.face_tables.shape_weights import check_weights, find_lacks, shape_of

@@ -11,7 +11,7 @@ from fba.atomic import atomic
 from fba.capture import ShapeMotion, to_blendshapes
 from fba.carriage.avatar_units import JOINTS, SHAPES, TICKS_MAX, write_configuration, write_units
 from fba.errors import FormatError, Remedy
-from fba.formats.avatar._names import (
+from fba.formats.avatar._container import (
     BODY_PROFILE,
     FACE_JOINTS,
     FACE_PROFILE,

@@ -3,11 +3,13 @@
 from fba.mesh.simplify._memoryless import (
     Level,
     Simplification,
+    carry_parts,
+    part_looks,
+    part_starts,
     place_on_full,
     place_on_level,
     simplify,
 )
-from fba.mesh.simplify._parts import carry_parts, part_looks, part_starts
 from fba.mesh.simplify._quadrics import TOLERANCES, DetailLevels, simplify_by_quadrics
 
 __all__ = [

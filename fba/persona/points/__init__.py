@@ -3,9 +3,7 @@
 May use: the face, and `fba.capture.points`, which knows the trackers.
 """
 
-from fba.persona.points._adaptation import from_point_motion
-from fba.persona.points._registration import Registered, fit_face_points, register
-from fba.persona.points._tracked import TrackedFace
+from fba.persona.points._tracked import Registered, TrackedFace, fit_face_points, from_point_motion, register
 from fba.persona.points.layout import mask_distance
 
 __all__ = ["Registered", "TrackedFace", "fit_face_points", "from_point_motion", "mask_distance", "register"]

@@ -3,7 +3,13 @@
 May use: the points of a Persona, and readers of arrays.
 """
 
-from fba.persona.recognition._component import Component, Network, displacements
-from fba.persona.recognition._recogniser import ClassRecogniser, Labels, decide
+from fba.persona.recognition._recogniser import (
+    ClassRecogniser,
+    Component,
+    Labels,
+    Network,
+    decide,
+    displacements,
+)
 
 __all__ = ["ClassRecogniser", "Component", "Labels", "Network", "decide", "displacements"]

@@ -3,8 +3,7 @@
 May use: all of `fba.planning`, the models of faces and bodies.
 """
 
-from fba.planning.rate._bucket import LeakyBucket
-from fba.planning.rate._encoder import RateEncoder, RateStatistics
+from fba.planning.rate._encoder import LeakyBucket, RateEncoder, RateStatistics
 from fba.planning.rate._errors import DistanceErrors, ParameterErrors, ShownErrors, measure_errors
 from fba.planning.rate._search import RatedStream, encode_at_rate
 

@@ -1,4 +1,4 @@
-"""`RateEncoder`: encodes frame by frame at a mean rate, within a bounded buffer."""
+"""`RateEncoder`: encodes frame by frame at a mean rate, within a bounded buffer, a `LeakyBucket`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import numpy as np
 from fba.animation import Animation, Frame, check_order
 from fba.codec import Encoder, EncoderOptions, EncoderStatistics, write_mark
 from fba.errors import FbaWarning, OptionError, RangeError, Remedy
-from fba.planning.rate._bucket import LeakyBucket
 from fba.planning.rate._errors import error_weights
 from fba.planning.rate._expectations import expected_motion, quantiser_for
 from fba.tracks import BodyTrack, FaceTrack
@@ -323,3 +322,48 @@ def _sends_other(frame: Animation, last: Animation) -> bool:
     if asked is None or asked_before is None:
         return asked is not asked_before
     return not np.array_equal(asked, asked_before)
+
+
+@dataclass
+class LeakyBucket:
+    """A buffer that planes fill, and that a channel empties at a constant rate.
+
+    rate: bits a second. size: bits that fit. level: bits in it at `time`, in seconds. peak: the highest level
+    so far.
+
+    While the level stays within the size, no stretch of the stream takes more than rate x its length + size
+    bits. A receiver that waits for size / rate seconds before it begins never has to wait again.
+
+    Raises ValueError for a rate or a size that is not positive.
+    """
+
+    rate: float
+    size: float
+    time: float = 0.0
+    level: float = 0.0
+    peak: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "size"):
+            value = getattr(self, name)
+            if not (value > 0 and math.isfinite(value)):
+                raise ValueError(f"{name} must be a positive number, not {value!r}")
+
+    def drain(self, time: float) -> None:
+        """Advance to a later time."""
+        self.level = self.level_at(time)
+        self.time = time
+
+    def level_at(self, time: float) -> float:
+        """Return the level at a later time, if nothing is added until then."""
+        return max(0.0, self.level - self.rate * (time - self.time))
+
+    def add(self, bits: float) -> None:
+        """Add the bits of a plane."""
+        self.level += bits
+        self.peak = max(self.peak, self.level)
+
+    @property
+    def room(self) -> float:
+        """Bits that still fit."""
+        return self.size - self.level

@@ -1,4 +1,7 @@
-"""Which groups of parameters move when: mouth, eyes, brows, head, arms, and so on."""
+"""Which groups of parameters move when: mouth, eyes, brows, head, arms, and so on.
+
+Parameters of different units are compared by their `reach`: a motion that is strong and plausible.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,14 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Array, Float64, Intp, UInt8
 from fba.face import FaceSettings, Resolver
-from fba.parameters import BAP_STANDARD_COUNT, FIRST_LOW_LEVEL_FAP, Bap, baps, faps
+from fba.parameters import BAP_STANDARD_COUNT, FIRST_LOW_LEVEL_FAP, Bap, bap_numbers, baps, faps
+from fba.text_files import packaged_rows
 from fba.tracks import hold
-from fba_player.session._reach import bap_reach, reach
 
+TYPICAL_ANGLE = 45.0
+"""Degrees of a BAP that count as much as the typical motion of a FAP."""
+TYPICAL_SHIFT = 300.0
+"""Millimetres of a BAP that count as much."""
 FRAMES_AT_ONCE = 1024
 """Frames processed at once."""
 FULL_SPEED = 5.0
@@ -163,3 +170,18 @@ def _body_group(bap: Bap) -> str:
     if bap.joint.startswith("vc"):
         return "neck"
     return BODY_GROUPS.get(bap.group, "hands" if "hand" in bap.group_name else "trunk")
+
+
+@cache
+def reach(number: int) -> float:
+    """Return the amount of a FAP in the gallery, in its unit: a strong, plausible motion."""
+    rows = packaged_rows("fba_player.export", "contact_sheet.csv")
+    return next(abs(float(row["value"])) for row in rows if int(row["fap"]) == number)
+
+
+def bap_reach(number: int) -> float:
+    """Return the typical strong motion of a BAP, in its unit."""
+    if baps()[number - 1].unit == "mm":
+        return TYPICAL_SHIFT
+    root = number >= bap_numbers()["HumanoidRoot_tr_vertical"]
+    return float(np.radians(TYPICAL_ANGLE * (2 if root else 1)) * 1e5)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fba.arrays import Float32, Int16
-from fba_player.playback._playhead import Motion
+from fba_player.playback._transport import Motion
 
 FADE_SECONDS = 0.004
 """Seconds over which sound fades in, out, and across a jump: without them it would click."""

@@ -1,7 +1,5 @@
 """Walking: what feet do, measured on points of the posed body."""
 
-from __future__ import annotations
-
 import csv
 from fractions import Fraction
 from pathlib import Path

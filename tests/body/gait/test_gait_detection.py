@@ -1,7 +1,5 @@
 """Steps found in walks: in made ones, whose poses are known, and in captured ones."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

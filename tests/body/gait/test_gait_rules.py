@@ -1,7 +1,5 @@
 """Decision constants of the detection of steps: each has a test here that dies with it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

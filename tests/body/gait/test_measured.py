@@ -1,7 +1,5 @@
 """Walks beside measured people: winter_natural_cadence.csv says where its figures come from."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

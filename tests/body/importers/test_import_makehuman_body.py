@@ -1,7 +1,5 @@
 """MakeHuman's base mesh with its rig as a body; needs a copy of the files."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Limits of human motion: the table's numbers, seen as motions of limbs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

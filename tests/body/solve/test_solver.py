@@ -1,7 +1,5 @@
 """Poses against rotations composed by hand, and solving against known BAPs."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

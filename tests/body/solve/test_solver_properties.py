@@ -1,7 +1,5 @@
 """The solver undoes poses: within human limits, at gimbal lock, and over smooth motions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

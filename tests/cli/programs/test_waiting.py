@@ -1,4 +1,7 @@
-"""What is said while a command takes long: that it compiles, and how far it is."""
+"""What is said while a command takes long: that it compiles, and how far it is.
+
+What the program sets to start sooner does no harm, and stays within its own process.
+"""
 
 import io
 import os
@@ -15,6 +18,29 @@ from fba import Animation
 from fba.cli.main import COMPILED_FUNCTIONS, CompileNotice
 from fba.cli.printing import Progress
 from fba.compiled import is_compiled
+
+COLLECTED = """
+import gc, weakref
+from fba.cli import startup
+startup.collect_less()
+class Cycle: pass
+cycle = Cycle()
+cycle.itself, gone = cycle, weakref.ref(cycle)
+del cycle
+print(gone() is None)
+kept = [[] for _ in range(gc.get_threshold()[0] + 1000)]
+print(gone() is None)
+"""
+
+MAIN = """
+import gc
+from fba.cli import main
+before = gc.get_threshold()
+try:
+    main.main(["--version"])
+finally:
+    print(gc.get_threshold() == before)
+"""
 
 
 class Terminal(io.StringIO):
@@ -89,3 +115,16 @@ def test_without_a_display_nothing_else_is_tried(
     refused = run("play", tmp_path / "broken.fba", code=1)
     assert "DISPLAY" in refused.err
     assert "broken" not in refused.err
+
+
+def ran(code: str) -> list[str]:
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return result.stdout.split()
+
+
+def test_a_process_that_calls_main_stays_as_it_is() -> None:
+    assert ran(MAIN)[-1] == "True"
+
+
+def test_garbage_is_still_collected() -> None:
+    assert ran(COLLECTED) == ["False", "True"]

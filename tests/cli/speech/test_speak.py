@@ -17,7 +17,7 @@ import pytest
 import fba
 from command_line import Run
 from fba.face import resolve
-from speech_sounds import babble
+from sound_clicks import babble
 
 CTM = "map 1 0.00 0.10 M\nmap 1 0.10 0.30 AE\nmap 1 0.40 0.10 P\n"
 needs_voice = pytest.mark.skipif(

@@ -1,7 +1,5 @@
 """Tables made from a mesh and its feature points: what moves, how far, and what stays."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables of real heads: the built-in one, and MakeHuman's where its files are."""
 
-from __future__ import annotations
-
 import time
 import warnings
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Heads with something missing, and meshes that cannot be a head."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What folds are measured by, and how motions are eased around them, on a rumpled plate."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

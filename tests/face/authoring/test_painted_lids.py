@@ -1,7 +1,5 @@
 """Lids on which lashes or a liner are painted: only bare skin is drawn out over the eye."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Fitting a face to a person: through all given points, whatever their unit and pose, or an error."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import warnings

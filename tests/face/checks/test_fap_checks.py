@@ -1,7 +1,5 @@
 """check_faps finds each way in which a model can break the standard: models are broken on purpose."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

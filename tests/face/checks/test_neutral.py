@@ -1,7 +1,5 @@
 """The neutral face of the standard: what keeps its rules passes, and each rule is found when broken."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +7,7 @@ import pytest
 
 from fba.face._tables import FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.checks._findings import Finding
-from fba.face.checks._locations import check_locations
-from fba.face.checks._neutral import check_neutral
+from fba.face.checks._neutral import check_locations, check_neutral
 from fba.face.eyeball import eyeballs, pupil_diameter, sphere
 from fba.face.feature_points import MIRRORED
 from fba.face.model import FaceModel, Part

@@ -1,7 +1,5 @@
 """The deformer against the standard's worked example, geometry, and a plain evaluation in NumPy."""
 
-from __future__ import annotations
-
 import gc
 import weakref
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Normals of the deformed face, output arrays, refusals, and the machine code's absence."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,23 +1,29 @@
-"""The JSON schema of the extension FBA_face, against what is written and what is read."""
+"""The JSON schema of the extension FBA_face, against what is written and what is read.
 
-from __future__ import annotations
+And what the official glTF validator says of files.
+"""
 
 import copy
 import json
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from test_storage_hostile import CASES
 
 from fba.face.gltf._storage import build
-from fba.face.model import PART_KINDS, FaceModel
+from fba.face.model import PART_KINDS, FaceModel, Material
 from fba.parameters import faps, feature_points
+from gltf_validator import assert_valid
 from json_places import put
 from stored_models import face, face_with_level, models
 
+KNOWN = {"UNSUPPORTED_EXTENSION", "UNUSED_OBJECT"}
+"""What the validator informs about: it does not know the extension, nor what only that uses."""
 jsonschema = pytest.importorskip("jsonschema")
 SCHEMA: dict[str, Any] = json.loads((files("fba.face") / "fba_face.schema.json").read_text(encoding="utf-8"))
 IN_SCHEMA = [(place, value) for place, value, _ in CASES if place.startswith("extensions/FBA_face/")]
@@ -73,3 +79,16 @@ def test_what_the_reader_refuses_the_schema_refuses_too(place: str, value: Any) 
 def test_the_schema_is_part_of_the_documentation() -> None:
     page = Path(__file__).parents[3] / "docs" / "face-models.md"
     assert "fba_face.schema.json" in page.read_text(encoding="utf-8")
+
+
+def plain(model: FaceModel) -> FaceModel:
+    """Without textures, colours and tables."""
+    parts = tuple(replace(part, colours=None, texcoords=None, material=Material()) for part in model.parts)
+    return replace(model, parts=parts, tables=(), bound=np.full(84, -1))
+
+
+@pytest.mark.parametrize("which", ["small", "plain", "built-in"])
+def test_the_validator_finds_no_fault(tmp_path: Path, which: str) -> None:
+    model = {"small": face, "plain": lambda: plain(face()), "built-in": FaceModel.default}[which]()
+    model.save(tmp_path / "a.glb")
+    assert_valid(tmp_path / "a.glb", informs=KNOWN)

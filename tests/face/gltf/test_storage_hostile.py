@@ -1,7 +1,5 @@
 """Damaged face files: a ModelError that names the place, and nothing half-loaded."""
 
-from __future__ import annotations
-
 import copy
 import json
 import random

@@ -1,7 +1,5 @@
 """Heads of drawn figures: flat eyes, shapes of both sides, mouths by the edge of the skin, visemes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Heads of other makers: margins of the eyes, symmetry, rows of teeth, and tables that break the rules."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Surfaces of heads whose points are to be placed: numbers of vertices, and what is known before."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 The feature points of all are found; only one is imported in full. With FBA_ALL_HEADS=1 all are.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 from pathlib import Path

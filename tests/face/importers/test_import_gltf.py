@@ -1,7 +1,5 @@
 """glTF heads: ARKit's shapes, shapes named after FAPs, and heads that nobody marked."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MakeHuman's head: cropped, with feature points that keep the standard's rules, moved by FAPs."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """OBJ, PLY, WFM and Xface meshes with feature points become faces that FAPs move."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files of feature points: CSV, JSON, text FDP, Xface FDP."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

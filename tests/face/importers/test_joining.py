@@ -1,7 +1,5 @@
 """Pieces joined to one part look as they did: textures become one picture, colours those of vertices."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

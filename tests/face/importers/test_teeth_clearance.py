@@ -1,7 +1,5 @@
 """Skin beside the mouth slides over the teeth where the corners of the mouth move inwards."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The FIT: what it accepts, its node and JSON, and its values, worked out by hand."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

@@ -1,7 +1,5 @@
 """What a face with an interpolation table shows: the table first, then mates; in one piece or in many."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

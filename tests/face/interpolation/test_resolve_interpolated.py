@@ -1,7 +1,5 @@
 """FAPs that a stream takes back: mask type 2 after they were sent, from the track and from coded planes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Learning a FIT: what FAPs follow from is found, and errors are those of streams not learned from."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""BVH as it is written, and as it is found."""
+"""BVH as it is written, and as it is found.
+
+Which frame rate a rounded frame time of a BVH file stands for.
+"""
 
 import time
 from fractions import Fraction
@@ -273,3 +276,18 @@ def test_only_what_moves_more_than_its_parts_carries_the_body() -> None:
     with pytest.warns(FbaWarning, match="varies keep the median of it: Chest, Neck, Head"):
         carried = reader.parse(text(head, row(10, 10, 10, 10) + row(12, 10.1, 10.2, 10.1)))
     assert carried.names[0] == "Spine"
+
+
+@pytest.mark.parametrize(
+    ("frame_time", "rate"),
+    [
+        ("0.042", Fraction(24)),  # nearer to 23.976, but so coarse a time is that of a whole rate
+        ("0.0167", Fraction(60)),
+        ("0.0417", Fraction(24000, 1001)),  # much nearer than 24
+        ("0.0333667", Fraction(30000, 1001)),
+        ("0.0333333", Fraction(30)),
+        ("1000.5", Fraction(2, 2001)),
+    ],
+)
+def test_rate_of_a_frame_time(frame_time: str, rate: Fraction) -> None:
+    assert reader._rate(frame_time) == rate

@@ -16,6 +16,7 @@ from fba.formats import format_of
 from fba.formats.face_tables import _openface as openface
 from fba.formats.face_tables import _pyfeat as pyfeat
 from fba.parameters import fap_numbers
+from format_files import saved
 from tools.captures.face_files import openface_csv, pyfeat_csv
 
 ROWS = 30
@@ -25,12 +26,6 @@ STRENGTHS = {unit: np.roll(WAVE, unit) for unit in UNITS}
 OF_FIVE = {unit: 5 * values for unit, values in STRENGTHS.items()}
 AHEAD = np.tile([0.0, 0.0, -1.0], (ROWS, 2))
 STILL = np.zeros((ROWS, 3))
-
-
-def saved(folder: Path, text: str) -> Path:
-    path = folder / "a.csv"
-    path.write_text(text)
-    return path
 
 
 @pytest.mark.parametrize("blank", ["", " "])

@@ -20,6 +20,7 @@ from fba.formats.face_tables import _pyfeat as pyfeat
 from fba.formats.face_tables import _shapes_json as shapes_json
 from fba.formats.face_tables._livelink_csv import read_face
 from fba.parameters import fap_numbers
+from format_files import saved
 from tools.captures.face_files import ANGLES, camel, face_angles, face_weights, livelink_csv
 from tools.captures.tracked_actor import film
 
@@ -30,12 +31,6 @@ POSE = np.stack([0.2 * np.sin(np.arange(ROWS) / 9 + one) for one in range(3)], a
 UNITS = ("AU01", "AU02", "AU04", "AU06", "AU12", "AU25", "AU43")
 CLOCK = [f"00:{row // 25:02}" for row in range(ROWS)]
 """Whole seconds of a film of 25 frames in a second."""
-
-
-def saved(folder: Path, data: str | bytes, name: str = "a.csv") -> Path:
-    path = folder / name
-    path.write_bytes(data if isinstance(data, bytes) else data.encode())
-    return path
 
 
 def pyfeat_columns(*, mesh: bool = False, shapes: bool = True) -> dict[str, list[str]]:

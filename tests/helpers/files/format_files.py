@@ -49,3 +49,9 @@ def animations(draw: st.DrawFn, face: bool = True, body: bool = False) -> Animat
     )
     name = draw(st.text(max_size=20))
     return Animation(rate, index, **tracks, name=name)  # type: ignore[arg-type]
+
+
+def saved(folder: Path, data: str | bytes, name: str = "a.csv") -> Path:
+    path = folder / name
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    return path

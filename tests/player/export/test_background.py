@@ -1,7 +1,5 @@
 """Files that another process makes from a scene while the window goes on."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

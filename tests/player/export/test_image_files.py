@@ -1,7 +1,5 @@
 """Numbered pictures: their names, and that no mix of two sequences comes about."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,9 @@
-"""Films from made-up pictures, decoded again: times, colours, sound; no OpenGL."""
+"""Films from made-up pictures, decoded again: times, colours, sound; no OpenGL.
 
-from __future__ import annotations
+Turns of threads while a film is encoded.
+"""
 
+import sys
 import wave
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +14,7 @@ import pytest
 from PIL import Image
 
 from fba.errors import FormatError, UnsupportedError
-from fba_player.export._recorder import Recorder
+from fba_player.export._recorder import PROMPT_THREADS, PromptThreads, Recorder
 from fba_player.sound.soundtrack import Soundtrack, find_sound_beside
 from sound_clicks import click_time, sound, write_click
 
@@ -217,3 +219,46 @@ def test_sound_of_the_same_name_is_found(tmp_path: Path) -> None:
     assert find_sound_beside(tmp_path / "a.fba") == tmp_path / "a.WAV"
     assert find_sound_beside(tmp_path / "b.fba") is None
     assert find_sound_beside(tmp_path / "a.WAV") is None
+
+
+class Interpreter:
+    """Seconds of a turn, as an interpreter has them."""
+
+    def __init__(self, turn: float) -> None:
+        self.turn = turn
+
+    def prompt(self) -> PromptThreads:
+        def change(turn: float) -> None:
+            self.turn = turn
+
+        return PromptThreads(lambda: self.turn, change)
+
+
+def test_the_interval_is_short_until_the_last_user_leaves() -> None:
+    python = Interpreter(0.005)
+    prompt = python.prompt()
+    with prompt:
+        with prompt:
+            assert python.turn < 0.001
+        assert python.turn < 0.001
+    assert python.turn == 0.005
+    with prompt:
+        assert python.turn < 0.001
+
+
+def test_an_error_restores_the_old_interval() -> None:
+    python = Interpreter(0.005)
+    with pytest.raises(RuntimeError), python.prompt():
+        raise RuntimeError
+    assert python.turn == 0.005
+
+
+def test_shorter_turns_stay() -> None:
+    python = Interpreter(0.0001)
+    with python.prompt():
+        assert python.turn == 0.0001
+
+
+def test_the_switch_interval_is_that_of_the_process() -> None:
+    with PROMPT_THREADS:
+        assert sys.getswitchinterval() < 0.001

@@ -1,7 +1,5 @@
 """The same pose drawn by pyrender and by us: the silhouettes agree."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The recorder: its thread, what it does when things go wrong, and that nothing is left half-written."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading

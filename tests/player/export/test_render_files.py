@@ -1,7 +1,5 @@
 """Films and pictures as files, read back."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from fractions import Fraction
 from pathlib import Path

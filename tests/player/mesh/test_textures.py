@@ -1,7 +1,5 @@
 """Pictures on faces: their sizes, what is seen of them, and what is kept of them."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

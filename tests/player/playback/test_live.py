@@ -1,7 +1,5 @@
 """A stream shown while it arrives: frames as soon as they are there, the last one held, damage told."""
 
-from __future__ import annotations
-
 import io
 import os
 import threading

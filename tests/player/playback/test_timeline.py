@@ -1,7 +1,5 @@
 """What is shown at a time: kept values, interpolation, gaps, long and hostile animations."""
 
-from __future__ import annotations
-
 import tracemalloc
 from fractions import Fraction
 

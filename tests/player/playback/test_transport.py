@@ -1,7 +1,5 @@
 """Transport: the clock is wall time x speed; a fake clock stands in for the wall."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

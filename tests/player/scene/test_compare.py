@@ -1,7 +1,5 @@
 """Several performances in one picture, and by how much they differ."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -14,9 +12,8 @@ from fba_player.gl._labels import legend_picture
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Transport
 from fba_player.scene._compare_timeline import CompareTimeline
-from fba_player.scene._difference_colours import distances, round_up
 from fba_player.scene._differences import differences
-from fba_player.scene.compare import ROOTS, CompareScene
+from fba_player.scene.compare import ROOTS, CompareScene, distances, round_up
 from fba_player.scene.scene import Scene
 from fba_player.view._geometry import project
 from player_tracks import body_track, face_track

@@ -1,7 +1,5 @@
 """The view as feature points and bones: what it draws, and that it is drawn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

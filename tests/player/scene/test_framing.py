@@ -1,12 +1,10 @@
 """Where a moving body takes place: what a camera has to have in view, and when it follows."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest
 
-from fba_player.scene._framing import body_extent
+from fba_player.scene.scene import body_extent
 from fba_player.view._camera import Camera
 
 NAMES = ("HumanoidRoot", "l_knee", "r_knee", "l_ankle", "r_ankle", "skullbase", "l_wrist")

@@ -1,7 +1,5 @@
 """Placing feature points by hand: order, mirroring, undoing, saving, and what a mouse points at."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a scene shows: the face follows its model, the body its joints."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How the camera of a window moves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

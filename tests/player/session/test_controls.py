@@ -1,7 +1,5 @@
 """Keys and mouse, without a window."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

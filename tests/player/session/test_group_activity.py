@@ -1,7 +1,5 @@
 """Which groups of parameters move when, and how that is drawn: values set by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fba.animation import Animation

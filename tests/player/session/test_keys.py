@@ -1,7 +1,5 @@
 """The table of keys, the panels that it opens, and the documentation of both."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

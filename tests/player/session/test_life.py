@@ -1,7 +1,5 @@
 """Signs of life: what they add, where, and that nothing that is saved has them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

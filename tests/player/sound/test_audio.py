@@ -1,7 +1,5 @@
 """Audio files of all sorts, and a whole player of sound on a device that nobody hears."""
 
-from __future__ import annotations
-
 import time
 import tracemalloc
 import warnings
@@ -15,11 +13,9 @@ import pytest
 from fba.animation import Animation
 from fba.audio import SoundFile
 from fba.errors import FbaWarning, FormatError
-from fba_player.playback._playhead import Motion
 from fba_player.playback._timeline import Timeline
-from fba_player.playback._transport import Transport
-from fba_player.sound._player import Audio, find_sound_beside, open_audio
-from fba_player.sound._read_ahead import SoundBlocks, samples_ahead
+from fba_player.playback._transport import Motion, Transport
+from fba_player.sound._player import Audio, SoundBlocks, find_sound_beside, open_audio, samples_ahead
 from player_tracks import face_track
 
 av = pytest.importorskip("av")

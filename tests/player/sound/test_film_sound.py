@@ -1,7 +1,5 @@
 """Films of the window carry what was heard, when it was heard; read back from the file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The outline of a sound: its lowest and highest samples over time."""
 
-from __future__ import annotations
-
 import wave
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The clock of a sound device, with devices that are punctual, unpunctual, fast, and that stop."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

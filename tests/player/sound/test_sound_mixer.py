@@ -1,16 +1,13 @@
 """What a device is given, from where the performance is: the sound itself says which sample it is."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from fba.animation import Animation
-from fba_player.playback._playhead import Motion
 from fba_player.playback._timeline import Timeline
-from fba_player.playback._transport import Transport
+from fba_player.playback._transport import Motion, Transport
 from fba_player.sound._mixer import FADE_SECONDS, SoundMixer
 from player_tracks import face_track
 

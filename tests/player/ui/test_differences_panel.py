@@ -1,7 +1,5 @@
 """The panel of differences, drawn into memory."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from fractions import Fraction
 
@@ -20,6 +18,7 @@ from studio_hand import panel_of
 graphics.imported("imgui_bundle")
 
 from fba_player._ui.panels._differences_panel import DifferencesPanel, _shown, thin_curve  # noqa: E402 - needs imgui
+from studio_hand import StudioHand  # noqa: E402
 from tools.window_picture import Studio  # noqa: E402
 
 SIZE = (900, 640)
@@ -39,22 +38,13 @@ def studio(opengl: None) -> Iterator[Studio]:
         yield made
 
 
-def click(studio: Studio, place: tuple[float, float]) -> None:
-    io = studio.gui.io
-    io.add_mouse_pos_event(*place)
-    studio.draw(2)
-    for down in (True, False):
-        studio.gui.io.add_mouse_button_event(0, down)
-        studio.draw(2)
-
-
 def test_a_row_takes_to_where_the_difference_is_largest(studio: Studio) -> None:
     studio.session.open.add("differences")
     picture = studio.draw(6)
     panel = picture[60:600, 520:886, :3].astype(int)
     accent = (abs(panel - (92, 173, 230)).sum(axis=2) < 60).sum()
     assert accent > 100  # the curve and the heading
-    click(studio, (600.0, 186.0))
+    StudioHand(studio).click(600.0, 186.0)
     assert studio.session.transport.time == pytest.approx(0.2)
 
 

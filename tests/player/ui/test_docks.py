@@ -1,7 +1,5 @@
 """Where panels stand: columns that leave the middle free, share their height, and fold what is too much."""
 
-from __future__ import annotations
-
 import pytest
 
 from fba_player._ui._docks import (

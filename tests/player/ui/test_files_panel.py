@@ -1,7 +1,5 @@
 """The panel that opens and exports files."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The panels over the picture, drawn into memory; the mouse is imgui's own queue of events."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,14 +19,10 @@ from set_clock import Clock
 
 imgui = graphics.imported("imgui_bundle").imgui
 
+from studio_hand import StudioHand  # noqa: E402
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (900, 600)
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
 
 
 @pytest.fixture
@@ -53,43 +47,19 @@ def place(studio: Studio, share: float) -> tuple[float, float]:
     return left + share * (right - left), (top + bottom) / 2
 
 
-def move(studio: Studio, x: float, y: float) -> None:
-    studio.gui.io.add_mouse_pos_event(x, y)
-    studio.session.touched()
-    studio.settle(2)
-
-
-def button(studio: Studio, down: bool, number: int = 0) -> None:
-    studio.gui.io.add_mouse_button_event(number, down)
-    studio.settle(2)
-
-
-def click(studio: Studio, x: float, y: float) -> None:
-    move(studio, x, y)
-    button(studio, True)
-    button(studio, False)
-
-
-def drag(studio: Studio, start: tuple[float, float], end: tuple[float, float], number: int = 0) -> None:
-    move(studio, *start)
-    button(studio, True, number)
-    move(studio, *end)
-    button(studio, False, number)
-
-
 def test_scrubbing_follows_the_mouse_and_goes_on_playing(studio: Studio, clock: Clock) -> None:
     transport = studio.session.transport
     camera = studio.session.viewpoint.camera
     transport.play()
-    move(studio, *place(studio, 0.25))
-    button(studio, True)
+    StudioHand(studio).move(*place(studio, 0.25))
+    StudioHand(studio).button(True)
     assert transport.time == pytest.approx(0.09, abs=0.002)
-    move(studio, *place(studio, 0.75))
+    StudioHand(studio).move(*place(studio, 0.75))
     assert transport.time == pytest.approx(0.27, abs=0.002)
     clock.now += 0.05  # the mouse holds it where it is
     studio.settle(1)
     assert transport.time == pytest.approx(0.27, abs=0.002)
-    button(studio, False)
+    StudioHand(studio).button(False)
     clock.now += 0.05
     assert transport.playing
     assert transport.time == pytest.approx(0.32, abs=0.002)
@@ -97,9 +67,9 @@ def test_scrubbing_follows_the_mouse_and_goes_on_playing(studio: Studio, clock: 
 
 
 def test_dragging_beyond_the_timeline_stops_at_its_ends(studio: Studio) -> None:
-    drag(studio, place(studio, 0.5), (SIZE[0] + 50, 20))
+    StudioHand(studio).drag(place(studio, 0.5), (SIZE[0] + 50, 20))
     assert studio.session.transport.frame == 9
-    drag(studio, place(studio, 0.5), (-40, 20))
+    StudioHand(studio).drag(place(studio, 0.5), (-40, 20))
     assert studio.session.transport.frame == 0
 
 
@@ -113,9 +83,9 @@ def test_marks_are_drawn_and_dragged(studio: Studio) -> None:
     outside = np.r_[0 : round(0.2 * (right - left)), round(0.8 * (right - left)) : right - left]
     assert changed[:, outside].mean() > 0.5  # darker outside the loop
     transport.seek(0.2)
-    drag(studio, place(studio, 0.08 / 0.36), place(studio, 0.5))
+    StudioHand(studio).drag(place(studio, 0.08 / 0.36), place(studio, 0.5))
     assert transport.mark_in == pytest.approx(0.18, abs=0.002)
-    drag(studio, place(studio, 0.28 / 0.36), place(studio, 0.1))  # not before the other one
+    StudioHand(studio).drag(place(studio, 0.28 / 0.36), place(studio, 0.1))  # not before the other one
     assert transport.mark_out is not None
     assert transport.mark_in == pytest.approx(0.18, abs=0.002)
     assert transport.mark_in < transport.mark_out < 0.2
@@ -124,7 +94,7 @@ def test_marks_are_drawn_and_dragged(studio: Studio) -> None:
 
 def test_a_right_drag_sets_both_marks(studio: Studio) -> None:
     transport = studio.session.transport
-    drag(studio, place(studio, 0.75), place(studio, 0.25), 1)
+    StudioHand(studio).drag(place(studio, 0.75), place(studio, 0.25), 1)
     assert transport.mark_in == pytest.approx(0.09, abs=0.002)
     assert transport.mark_out == pytest.approx(0.27, abs=0.002)
 
@@ -134,9 +104,9 @@ def test_the_picture_turns_only_where_no_panel_is(studio: Studio) -> None:
     session.open.add("file")
     studio.settle(4)
     before = session.viewpoint.camera
-    drag(studio, (60, 200), (160, 200))  # on the panel
+    StudioHand(studio).drag((60, 200), (160, 200))  # on the panel
     assert session.viewpoint.camera == before
-    drag(studio, (600, 300), (700, 300))
+    StudioHand(studio).drag((600, 300), (700, 300))
     assert session.viewpoint.camera.yaw == pytest.approx(before.yaw - 35)
     studio.gui.io.add_mouse_wheel_event(0, 1)
     studio.settle(2)
@@ -146,25 +116,25 @@ def test_the_picture_turns_only_where_no_panel_is(studio: Studio) -> None:
 def test_buttons_open_and_close_panels(studio: Studio) -> None:
     session = studio.session
     plain = studio.draw(2).astype(int)
-    click(studio, 855, 31)  # the last of the buttons above
+    StudioHand(studio).click(855, 31)  # the last of the buttons above
     opened = session.open.copy()
     assert len(opened) == 1
     assert (np.abs(studio.draw(3).astype(int) - plain).sum(axis=2) > 30).mean() > 0.05
-    click(studio, 855, 31)
+    StudioHand(studio).click(855, 31)
     assert session.open == set()
 
 
 def test_play_button(studio: Studio) -> None:
     _, _, _, bottom = studio.gui.bar.area
-    click(studio, SIZE[0] / 2, bottom + 28)
+    StudioHand(studio).click(SIZE[0] / 2, bottom + 28)
     assert studio.session.transport.playing
-    click(studio, SIZE[0] / 2, bottom + 28)
+    StudioHand(studio).click(SIZE[0] / 2, bottom + 28)
     assert not studio.session.transport.playing
 
 
 def test_the_bar_hides_itself_while_playing_and_comes_back(studio: Studio, clock: Clock) -> None:
     session = studio.session
-    move(studio, 450, 200)
+    StudioHand(studio).move(450, 200)
     shown = studio.draw(1).astype(int)
     clock.now += 60
     paused = studio.draw(30).astype(int)
@@ -387,7 +357,7 @@ def test_the_text_at_the_mouse_names_what_is_said(speaking: Studio) -> None:
     speaking.session.lanes = "all"
     left, top, right, bottom = speaking.gui.bar.lanes.areas["visemes"]
     before = speaking.draw(1).astype(int)
-    move(speaking, (left + right) / 2, (top + bottom) / 2)
+    StudioHand(speaking).move((left + right) / 2, (top + bottom) / 2)
     changed = np.abs(speaking.draw(1).astype(int) - before).sum(axis=2) > 30
     assert changed[: round(top) - 30].sum() > 2000
 
@@ -416,30 +386,30 @@ def test_lanes_are_chosen_and_leave_room_for_the_figure(speaking: Studio) -> Non
 
 def test_a_drag_on_a_lane_seeks(speaking: Studio) -> None:
     left, top, right, bottom = speaking.gui.bar.lanes.areas["expressions"]
-    drag(speaking, (left + 5, (top + bottom) / 2), ((left + right) / 2, (top + bottom) / 2))
+    StudioHand(speaking).drag((left + 5, (top + bottom) / 2), ((left + right) / 2, (top + bottom) / 2))
     assert speaking.session.transport.time == pytest.approx(1.98, abs=0.02)
 
 
 def test_the_wheel_enlarges_the_timeline_about_the_mouse(speaking: Studio) -> None:
     session, zoom = speaking.session, speaking.session.zoom
     camera = session.viewpoint.camera
-    move(speaking, *place(speaking, 0.25))
+    StudioHand(speaking).move(*place(speaking, 0.25))
     speaking.gui.io.add_mouse_wheel_event(0, 5)
     speaking.settle(2)
     assert zoom.high - zoom.low == pytest.approx(3.96 * 0.8**5)
     assert zoom.low + 0.25 * (zoom.high - zoom.low) == pytest.approx(0.99, abs=0.02)
     assert session.viewpoint.camera == camera
-    click(speaking, *place(speaking, 0.5))
+    StudioHand(speaking).click(*place(speaking, 0.5))
     assert session.transport.time == pytest.approx((zoom.low + zoom.high) / 2, abs=0.02)
     low = zoom.low
     speaking.gui.io.add_mouse_wheel_event(-1, 0)  # sideways
     speaking.settle(2)
     assert zoom.low == pytest.approx(low + 0.1 * (zoom.high - zoom.low), abs=0.01)
-    drag(speaking, place(speaking, 0.5), place(speaking, 0.75), 2)  # with the middle button
+    StudioHand(speaking).drag(place(speaking, 0.5), place(speaking, 0.75), 2)  # with the middle button
     assert zoom.low < low
     speaking.settle(1)
     x, y = speaking.gui.bar.zoom_bar
-    drag(speaking, (x, y), (SIZE[0], y))
+    StudioHand(speaking).drag((x, y), (SIZE[0], y))
     assert zoom.high == pytest.approx(3.96)
 
 

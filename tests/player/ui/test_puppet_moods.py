@@ -1,7 +1,5 @@
 """The puppeteer's moods: the plane, the sliders, and that a path over the plane becomes a take."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -83,11 +81,6 @@ def studio(opengl: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clock:
         StudioHand(studio).click(*panel_of(studio, "puppet").buttons["Mood"])
         studio.draw(2)
         yield studio
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
 
 
 def place(studio: Studio, name: str) -> tuple[float, float]:

@@ -1,7 +1,5 @@
 """Times along the timeline, and what is drawn behind it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

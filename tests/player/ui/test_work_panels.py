@@ -1,7 +1,5 @@
 """Curves, bit rate and puppeteer, drawn into memory and used with imgui's own mouse."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -24,11 +22,6 @@ imgui = graphics.imported("imgui_bundle").imgui
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (1000, 640)
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
 
 
 Opened = Callable[..., Studio]

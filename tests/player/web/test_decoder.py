@@ -1,7 +1,5 @@
 """The decoder in JavaScript finds in every stream what the one in Python finds."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import shutil

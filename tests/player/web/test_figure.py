@@ -1,7 +1,5 @@
 """Heads and persons in JavaScript: what they show is what those in Python show."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

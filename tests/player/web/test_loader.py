@@ -1,7 +1,5 @@
 """`fba-loader.js` moves the morph targets of three.js as `to_blendshapes` says."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

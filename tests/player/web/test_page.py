@@ -1,7 +1,5 @@
 """The page of `fba export` in real browsers: pictures as on the desktop, controls, hostile input."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

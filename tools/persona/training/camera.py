@@ -6,7 +6,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.parameters import point_rows
-from fba.persona.points._adaptation import head_matrices
+from fba.persona.points._tracked import head_matrices
 from fba.persona.points.layout import TRACKED, points_of_face
 
 FAR = 0.9

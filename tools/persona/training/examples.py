@@ -9,7 +9,7 @@ import numpy as np
 from fba.arrays import Float64, Intp
 from fba.parameters import FAP_COUNT
 from fba.persona.points import fit_face_points
-from fba.persona.points._registration import register_points
+from fba.persona.points._tracked import register_points
 from fba.persona.points.layout import REGISTERED, mask_of_face, points_of_face, standard_points
 from tools.persona.training.camera import photograph
 from tools.persona.training.classes import class_faps

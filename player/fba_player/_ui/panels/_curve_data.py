@@ -19,7 +19,7 @@ from fba_player._ui.panels._derived import (
     measures,
     selected_course,
 )
-from fba_player.session._reach import bap_reach, reach
+from fba_player.session._group_activity import bap_reach, reach
 
 RESOLVED_AT_ONCE = 512
 """Frames of a face resolved at once: about two milliseconds."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.parameters import bap_numbers, baps, fap_numbers, faps
 from fba.text_files import packaged_rows
-from fba_player.session._reach import reach
+from fba_player.session._group_activity import reach
 
 RANGE_FACTOR = 1.5
 """Range of a FAP's slider relative to the value that the gallery shows."""
