@@ -166,10 +166,10 @@ def test_the_first_window_keeps_its_bar_and_nothing_covers_the_hints(
     assert studio.gui.shown == 1.0
     session.transport.pause()
     left, top, right, _ = studio.gui.bar.area
-    move(studio, left, top - 500)
+    StudioHand(studio).move(left, top - 500)
     row = slice(round(top) - 66, round(top) - 28)  # the strip of hints
     strip = studio.draw(1)[row].astype(int)
-    move(studio, (left + right) / 2, top + 5)
+    StudioHand(studio).move((left + right) / 2, top + 5)
     session.say("a notice")
     np.testing.assert_array_equal(studio.draw(2)[row], strip)
     session.memory.welcome()
