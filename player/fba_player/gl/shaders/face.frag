@@ -1,9 +1,9 @@
 #version 330 core
 //include lighting.glsl
 #ifdef FINELY
-in vec3 before;
+centroid in vec3 before;
 #ifdef SMOOTH
-in vec3 keyed;
+centroid in vec3 keyed;
 #endif
 #endif
 uniform sampler2D picture; // square roots of linear light
@@ -21,18 +21,18 @@ uniform float cut;         // pixels that are less opaque are holes
 uniform sampler2D wrinkle_map;
 uniform vec4 wrinkle_window; // of a place: factors and offsets to the map's coordinates
 const vec3 DARKENS = vec3(0.50, 0.58, 0.60); // light in a groove comes through the skin, and is redder
-in vec2 wrinkle_place;
-in vec4 wrinkles;
+centroid in vec2 wrinkle_place;
+centroid in vec4 wrinkles;
 #endif
-in vec4 upright;
-in vec4 coordinates;
+centroid in vec4 upright;
+centroid in vec4 coordinates;
 #ifdef SMOOTH
-in vec4 shade;
-in vec4 halfway;
+centroid in vec4 shade;
+centroid in vec4 halfway;
 #else
-in vec3 place;
-in vec4 colour;
-in vec4 light;
+centroid in vec3 place;
+centroid in vec4 colour;
+centroid in vec4 light;
 #endif
 out vec4 pixel;
 

@@ -5,15 +5,18 @@
 // it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
+// All that is passed on is `centroid`: many triangles of a small face are smaller than a pixel, and values at the
+// pixel's middle, well outside them, would be dark or bright specks.
+//
 // The head turns rigidly; the neck bends with it, and stands still at its lower end.
 //include lighting.glsl
 #ifdef SHADED
 uniform vec3 frame;       // corner of what the map of shadows shows, along its axes, and its share of a metre
 uniform float clearance;  // metres by which what throws a shadow is off the surface
 #ifdef FINELY
-out vec3 before;          // place in that map, and height
+centroid out vec3 before;          // place in that map, and height
 #ifdef SMOOTH
-out vec3 keyed;           // the key light's part of `shade`
+centroid out vec3 keyed;           // the key light's part of `shade`
 #endif
 #endif
 #endif
@@ -34,8 +37,8 @@ in float in_sway;       // how far it turns with the head
 in vec2 in_wrinkle;     // place in the map of wrinkles, x positive on the left
 uniform vec4 wrinkles_left;  // strength of each wrinkle
 uniform vec4 wrinkles_right;
-out vec2 wrinkle_place;
-out vec4 wrinkles;
+centroid out vec2 wrinkle_place;
+centroid out vec4 wrinkles;
 #endif
 #ifdef LIMBS
 uniform vec4 limbs[24]; // both ends of each, and its radius
@@ -44,15 +47,15 @@ uniform vec4 limbs[24]; // both ends of each, and its radius
 in vec4 in_across;      // of hairs: from the opposite vertex to this one, and half the width; else 0, 0, 0, 1
 in vec4 in_along;       // of hairs: direction to the tip, and which of the two sides this is
 #endif
-out vec4 upright;       // normal, and its cosine with the direction to the eye
-out vec4 coordinates;   // in the picture; share of its pixels that a hair covers; width of reflected light
+centroid out vec4 upright;       // normal, and its cosine with the direction to the eye
+centroid out vec4 coordinates;   // in the picture; share of its pixels that a hair covers; width of reflected light
 #ifdef SMOOTH
-out vec4 shade;         // diffuse light times the colour, and the reflected share of the key light
-out vec4 halfway;       // between the directions to the eye and to the key light; other reflected light
+centroid out vec4 shade;         // diffuse light times the colour, and the reflected share of the key light
+centroid out vec4 halfway;       // between the directions to the eye and to the key light; other reflected light
 #else
-out vec3 place;
-out vec4 colour;
-out vec4 light;
+centroid out vec3 place;
+centroid out vec4 colour;
+centroid out vec4 light;
 #endif
 
 const vec3 SKIN = vec3(0.60, 0.36, 0.28);   // typical colour of a texture of skin
