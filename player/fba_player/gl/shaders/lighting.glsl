@@ -130,13 +130,15 @@ vec3 diffuse(vec3 n, vec3 albedo, vec4 reach, float scatter) {
 // Shadows that bodies throw on bodies.
 uniform sampler2D tops;   // along the key light: what share is covered, height of what it reaches first, its square
 
-// Share of the key light at a place in that map and a height, from mean and variance of the heights around: at most this share of them is not above.
-// Little of that comes from heights that differ by more than one surface can.
+// Share of the key light at a place in that map and a height, from mean and variance of the heights around: at most
+// this share of them is not above. Little of that comes from heights that differ by more than one surface can. Less
+// is hidden where little around is covered: at an outline of the body, seen from the light.
 float unshaded(vec3 before) {
     vec2 aside = vec2(1.2, 0.6) / float(textureSize(tops, 1).x);
     vec3 seen = textureLod(tops, before.xy + aside, 2.0).rgb + textureLod(tops, before.xy - aside, 2.0).rgb;
     vec2 mean = seen.yz / max(seen.x, 1e-3);
     float above = max(mean.x - before.z, 0.0), spread = max(mean.y - mean.x * mean.x, 2e-4);
-    return 0.16 + 0.84 * clamp((spread / (spread + above * above) - 0.3) * 1.43, 0.0, 1.0);
+    float hidden = 0.84 * clamp(1.0 - (spread / (spread + above * above) - 0.3) * 1.43, 0.0, 1.0);
+    return 1.0 - hidden * min(seen.x, 1.0);
 }
 #endif
