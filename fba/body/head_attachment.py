@@ -112,7 +112,8 @@ class AttachedHead:
         if local.shape != self.skinner.vertices.shape:
             raise ValueError(f"vertices must have shape {self.skinner.vertices.shape}, not {local.shape}")
         placed = local * np.float32(self.size)
-        placed += self.shift
+        for axis in range(3):  # a whole column at once is several times faster than rows of three
+            placed[:, axis] += self.shift[axis]
         return self.skinner.skin_vertices(placed, local_normals, matrices, out, normals, method)
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int64, UInt32
 from fba.errors import RangeError
-from fba.face.deform._normals import build_surface
+from fba.face.deform._normals import build_surface, restrict_surface
 from fba.face.deform.flat_tables import (
     VALUE_MAX,
     FlatModel,
@@ -55,8 +55,9 @@ def _flat_model(model: FaceModel) -> FlatModel:
 def _flatten(model: FaceModel) -> FlatModel:
     shifts = flatten_shifts(model, all_vertices(model), np.float32)
     starts = np.cumsum([0, *(len(part.vertices) for part in model.parts)], dtype=np.int64)
+    rows = np.arange(len(model.vertices), dtype=np.uint32)
     return FlatModel(
-        mesh=MovingMesh(model.vertices, starts, shifts, build_surface(model, shifts.rows)),
+        mesh=MovingMesh(model.vertices, starts, rows, starts, shifts, build_surface(model, shifts.rows)),
         transforms=flatten_transforms(model),
         point_shifts=flatten_shifts(model, bound_points(model), np.float64),
         owner=_find_owners(model),
@@ -97,6 +98,23 @@ class Deformer:
     def normal_groups(self) -> UInt32:
         """uint32 (V,): equal for vertices that share a normal, as those along the seam of a texture do."""
         return self._tables.mesh.surface.sum_of
+
+    def restrict(self, rows: npt.ArrayLike) -> Deformer:
+        """Return a deformer that moves only these vertices (N,): other rows of its results have no meaning.
+        IndexError for vertices that do not exist."""
+        wanted = np.zeros(len(self.model.vertices), dtype=bool)
+        wanted[np.asarray(rows)] = True
+        some, mesh = np.flatnonzero(wanted).astype(np.uint32), self._tables.mesh
+        before = np.concatenate([[0], np.cumsum(wanted)])
+        mesh = mesh._replace(
+            rows=some,
+            rows_start=before[mesh.part_start],
+            shifts=mesh.shifts._replace(amount=np.zeros_like(mesh.shifts.amount)),
+            surface=restrict_surface(mesh.surface, some),
+        )
+        fewer = Deformer(self.model)
+        fewer._tables = fewer._tables._replace(mesh=mesh)
+        return fewer
 
     def __call__(
         self, faps: npt.ArrayLike, out: Float32 | None = None, normals: Float32 | None = None

@@ -4,9 +4,9 @@ For each frame the neutral face is copied, every FAP that is not 0 adds its shif
 the triangles of the parts that changed, and the transforms of each part and of the head are applied.
 
 Bounds: tables and scratch are those of one model (`Deformer`), whose rows, corners, columns and parts lie
-within it (`FaceModel` checks that, `flat_tables` and `build_surface` number them); `frame_values` makes sure
-of 68 values a frame, `result_array` of room for every vertex. No index comes from a value of a FAP but the
-interval, which stops at the last one of its track.
+within it (`FaceModel` checks that, `flat_tables` and `build_surface` number them, `Deformer.restrict` takes
+some of them); `frame_values` makes sure of 68 values a frame, `result_array` of room for every vertex. No
+index comes from a value of a FAP but the interval, which stops at the last one of its track.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fba.arrays import Array, Float32, Float64, Int64
+from fba.arrays import Array, Float32, Float64, Int64, UInt32
 from fba.compiled import compiled
 from fba.face.deform._normals import Surface
 from fba.face.deform.flat_tables import MovingMesh, Shifts, Transforms
@@ -161,20 +161,21 @@ def turn_normals(
 
 @compiled
 def write_normals(
-    surface: Surface, touched: bool, part: int, turn: Float32, start: int, out: Float32
+    surface: Surface, touched: bool, part: int, turn: Float32, rows: UInt32, out: Float32
 ) -> None:
-    """Write the normals of a part to `out` (N, 3).
+    """Write the normals of a part's vertices `rows` (N,) to those of `out` (V, 3).
 
-    start: the part's first vertex. touched: use the new sums of normals, not the neutral ones.
+    touched: use the new sums of normals, not the neutral ones.
     """
     neutral, units = surface.neutral, surface.units
     first, stop = int(surface.changing_start[part]), int(surface.changing_start[part + 1])
     turn_normals(turn, surface.sums if touched else neutral, neutral, units, first, stop)
     first, stop = int(surface.still_start[part]), int(surface.still_start[part + 1])
     turn_normals(turn, neutral, neutral, units, first, stop)
-    sum_of = surface.sum_of[start : start + len(out)]
+    sum_of = surface.sum_of
     unit_x, unit_y, unit_z = units[0], units[1], units[2]
-    for v in range(len(out)):
+    for k in range(len(rows)):
+        v = rows[k]
         i = sum_of[v]
         out[v, 0], out[v, 1], out[v, 2] = unit_x[i], unit_y[i], unit_z[i]
 
@@ -186,6 +187,20 @@ def transform_points(pose: Array, moved: Array, out: Array) -> None:
     yx, yy, yz, y0 = pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3]
     zx, zy, zz, z0 = pose[2, 0], pose[2, 1], pose[2, 2], pose[2, 3]
     for v in range(len(moved)):
+        x, y, z = moved[v, 0], moved[v, 1], moved[v, 2]
+        out[v, 0] = xx * x + xy * y + xz * z + x0
+        out[v, 1] = yx * x + yy * y + yz * z + y0
+        out[v, 2] = zx * x + zy * y + zz * z + z0
+
+
+@compiled
+def transform_rows(pose: Array, rows: UInt32, moved: Array, out: Array) -> None:
+    """Write the points `rows` (N,) of `moved` (V, 3), transformed by `pose` (3, 4), to those of `out`."""
+    xx, xy, xz, x0 = pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3]
+    yx, yy, yz, y0 = pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3]
+    zx, zy, zz, z0 = pose[2, 0], pose[2, 1], pose[2, 2], pose[2, 3]
+    for k in range(len(rows)):
+        v = rows[k]
         x, y, z = moved[v, 0], moved[v, 1], moved[v, 2]
         out[v, 0] = xx * x + xy * y + xz * z + x0
         out[v, 1] = yx * x + yy * y + yz * z + y0
@@ -243,28 +258,29 @@ def deform_frames(
 ) -> None:
     """Write the vertices for FAPs `values` (T, 68) to `out` and their normals to `normals`, both (T, V, 3).
 
-    normals: (0, V, 3) for none. The first T of `scratch.poses` must be those of the frames.
+    Only those in `mesh.rows`. normals: (0, V, 3) for none. The first T of `scratch.poses` must be those of
+    the frames.
     """
-    part_start, surface, moved, pose = mesh.part_start, mesh.surface, scratch.moved, scratch.pose
+    starts, surface, moved, pose = mesh.rows_start, mesh.surface, scratch.moved, scratch.pose
     for frame in range(len(values)):
         for v in range(len(moved)):
             moved[v, 0], moved[v, 1], moved[v, 2] = mesh.rest[v, 0], mesh.rest[v, 1], mesh.rest[v, 2]
         scratch.touched[:] = 0
         add_shifts(values[frame], mesh.shifts, moved, scratch.touched)
-        for part in range(len(part_start) - 1):
+        for part in range(len(starts) - 1):
             combined = scratch.poses[frame, part]
             for row in range(3):
                 for column in range(4):
                     pose[row, column] = combined[row, column]
-            start, stop = int(part_start[part]), int(part_start[part + 1])
-            transform_points(pose, moved[start:stop], out[frame, start:stop])
+            rows = mesh.rows[int(starts[part]) : int(starts[part + 1])]
+            transform_rows(pose, rows, moved, out[frame])
             if len(normals) == 0:
                 continue
             cofactors(combined, scratch.turn)
             touched = scratch.touched[part] == 1
             if touched:
                 sum_normals(moved, surface, part)
-            write_normals(surface, touched, part, scratch.turn, start, normals[frame, start:stop])
+            write_normals(surface, touched, part, scratch.turn, rows, normals[frame])
 
 
 @compiled

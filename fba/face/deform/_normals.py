@@ -90,6 +90,29 @@ def build_surface(model: FaceModel, moved_rows: Integer) -> Surface:
     )
 
 
+def restrict_surface(surface: Surface, rows: UInt32) -> Surface:
+    """Return what the normals of these vertices (N,) alone need; other vertices take the last sum."""
+    last = surface.neutral.shape[1] - 1
+    wanted = np.zeros(last + 1, dtype=bool)
+    wanted[surface.sum_of[rows]] = True
+    wanted[last] = True
+    before = np.concatenate([[0], np.cumsum(wanted)])  # how many are wanted before each
+    number = np.where(wanted, before[:-1], before[-1] - 1)
+    needed = (wanted & (np.arange(last + 1) < last))[surface.corners].any(axis=1)
+    by_sum = np.ascontiguousarray(surface.neutral[:, wanted])
+    return Surface(
+        triangles=surface.triangles[needed],
+        corners=number[surface.corners[needed]].astype(np.uint32),
+        triangles_start=np.concatenate([[0], np.cumsum(needed)])[surface.triangles_start].astype(np.int64),
+        changing_start=before[surface.changing_start].astype(np.int64),
+        still_start=before[surface.still_start].astype(np.int64),
+        sum_of=number[surface.sum_of].astype(np.uint32),
+        neutral=by_sum,
+        sums=np.zeros_like(by_sum),
+        units=np.zeros_like(by_sum),
+    )
+
+
 def _sum_normals(vertices: Float64, triangles: Int32, corners: Int64, count: int) -> Float64:
     """Return (count, 3) sums of the normals of triangles, twice their areas long, over corners (F, 3)."""
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))

@@ -76,6 +76,10 @@ class MovingMesh(NamedTuple):
     """(V, 3) neutral vertices."""
     part_start: Int64
     """(P + 1,) first vertex of each part, and the number of all."""
+    rows: UInt32
+    """(N,) the vertices that are moved, ascending."""
+    rows_start: Int64
+    """(P + 1,) the first row of each part, and the number of all."""
     shifts: Shifts
     surface: Surface
 

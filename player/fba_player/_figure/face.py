@@ -142,13 +142,18 @@ def _iris_tint(part: Part, centre: Float64, radius: float) -> tuple[float, float
 class Pose:
     """The face shown for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4).
 
-    Lids follow the gaze, and the tongue keeps between teeth and lips.
+    Lids follow the gaze, and the tongue keeps between teeth and lips, if something is seen between these.
+    gap: metres between the lips, infinite where they are not known. shut: whether nothing is seen. deformer:
+    that which moved the vertices.
     """
 
     faps: Float32
     positions: Float32
     normals: Float32
     turn: Float64
+    gap: float
+    shut: bool
+    deformer: Deformer
 
 
 @dataclass(eq=False)
@@ -194,20 +199,41 @@ class FaceFigure:
         centre = (float(x), (top + low) / 2 - 0.07 * (top - low), float(z) - 0.3 * (top - low))
         return Subject(centre, 0.71 * (top - low), 0.60 * (top - low))
 
-    def pose(self, faps: Float32) -> Pose:
-        """Return the face for FAPs (68,); the last one is cached."""
-        if self._pose is None or not np.array_equal(self._pose.faps, faps):
-            self._pose = self._posed(faps.copy())
-        return self._pose
+    def pose(self, faps: Float32, deformer: Deformer | None = None, least_gap: float = 0.0) -> Pose:
+        """Return the face for FAPs (68,); the last one is cached.
 
-    def _posed(self, faps: Float32) -> Pose:
+        deformer: that of `restrict`, None for all vertices. least_gap: nothing is seen between lips that are
+        less than this apart, metres; the tongue then is anywhere.
+        """
+        deformer, last = deformer or self.deformer, self._pose
+        if (
+            last is None
+            or last.deformer is not deformer
+            or last.shut != (last.gap < least_gap)
+            or not np.array_equal(last.faps, faps)
+        ):
+            last = self._pose = self._posed(faps.copy(), deformer, least_gap)
+        return last
+
+    def restrict(self, rows: Intp) -> Deformer:
+        """Return what moves only these vertices (N,), and those that place eyes, mouth and tongues."""
+        whole = [self.rows(part.name) for part, ball in self.eyeballs if ball.bent]
+        placing = [np.r_[rows, *(tongue.rows for tongue in self.tongues), *whole], self.light.lips]
+        placing += [np.r_[tongue.lips, tongue.teeth, tongue.front] for tongue in self.tongues]
+        placing += [[lid for lid in ball.lids if lid >= 0] for _, ball in self.eyeballs]
+        return self.deformer.restrict(np.concatenate(placing).astype(np.intp))
+
+    def _posed(self, faps: Float32, deformer: Deformer, least_gap: float) -> Pose:
         normals = np.empty((len(self.model.vertices), 3), dtype=np.float32)
         eyes = [(ball.side, ball.radius) for _, ball in self.eyeballs]
         shown = follow_gaze(faps, eyes, self.model.fapu.IRISD)
-        positions = self.deformer.local(shown, out=np.empty_like(normals), normals=normals)
-        for tongue in self.tongues:
+        positions = deformer.local(shown, out=np.zeros_like(normals), normals=normals)
+        lips = self.light.lips
+        gap = float(np.linalg.norm(positions[lips[0]] - positions[lips[1]])) if lips else math.inf
+        for tongue in self.tongues if gap >= least_gap else ():
             tongue.bend(positions, normals, faps)
-        return Pose(faps, positions, normals, self.deformer.head_matrices(faps))
+        turn = self.deformer.head_matrices(faps)
+        return Pose(faps, positions, normals, turn, gap, gap < least_gap, deformer)
 
     def meshes(
         self, faps: Float32, matrix: Float64, *, on_body: bool = False, without: Sequence[str] = ()
@@ -233,19 +259,13 @@ class FaceFigure:
         """Return the slice of a part's vertices in the arrays of the model; KeyError for an unknown name."""
         return part_rows(self.model, name)
 
-    def shade(self, faps: Float32, frame: Float64, light: FaceLight | None = None) -> Float32:
-        """Return float32 (V, 4), the light that reaches the model's vertices, as in `FaceMesh.light`.
-
-        frame: (4, 4), the turned head's frame into the world. light: that on some of the vertices; None: all.
-        """
-        return (light or self.light).shade(self.pose(faps).positions, np.eye(3), frame[:3, :3])
-
     def eyes(self, faps: Float32, matrix: Float64, *, turned: bool = False) -> list[Eye]:
         """Return the eyeballs for FAPs (68,); matrix: (4, 4), into the world.
 
         turned: whether the matrix contains the head's turn already.
         """
-        pose = self.pose(faps)
+        last = self._pose  # any will do, as all of them have the vertices that place eyes
+        pose = last if last is not None and np.array_equal(last.faps, faps) else self.pose(faps)
         placed = matrix if turned else matrix @ pose.turn
         turns = dict(zip(self.model.starts, self.deformer.part_matrices(faps), strict=True))
         eyes = []

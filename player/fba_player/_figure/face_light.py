@@ -48,6 +48,8 @@ TURN_DECIMALS = 2
 """Decimals to which the head's rotation is rounded; the light changes invisibly little."""
 PRODUCT = 4096
 """Number of vertices whose light is one product of matrices."""
+ROW = np.complex128
+"""A number as wide as the four of light."""
 MIN_SWAY = 0.05
 """Occlusion is not computed at vertices that turn with the head by less than this."""
 
@@ -111,9 +113,13 @@ class FaceLight:
         return self._lips or ()
 
     def restrict(self, rows: Intp) -> FaceLight:
-        """Return what lights only these vertices (N,): other rows of its results have no meaning."""
+        """Return what lights only these vertices (N,), ascending: other rows of its results are 0."""
         light = FaceLight(self._model, self._deformer, self._sway)
         light.baked, light._rows = self.baked, rows
+        light._tongues, light._teeth = (
+            [slice(*np.searchsorted(rows, [part.start, part.stop]).tolist()) for part in parts]
+            for parts in (self._tongues, self._teeth)
+        )
         return light
 
     def shade(self, positions: Float32, turn: Float64, matrix: Float64) -> Float32:
@@ -123,7 +129,8 @@ class FaceLight:
         Returns the same array until something changes.
         """
         share = round(self._mouth_open(positions, self.baked.gaps), 2)
-        out = [self._out_of_mouth(positions[rows, 2], positions) for rows in self._tongues]
+        depths = positions[:, 2] if self._rows is None else positions[self._rows, 2]
+        out = [self._out_of_mouth(depths[rows], positions) for rows in self._tongues]
         # In steps too small to be seen, so that a pose looks the same whatever was shown before it.
         turned, still = np.round((matrix @ turn).T, TURN_DECIMALS), np.round(matrix.T, TURN_DECIMALS)
         key = (turned.tobytes(), still.tobytes(), share, *(float(o.sum()) for o in out))
@@ -138,14 +145,11 @@ class FaceLight:
         lights: as `_lights` returns them for the turned head and, where it differs, for one at rest. out:
         (N,) for each tongue, how far it is out.
         """
-        (shut, bent, wide), near, partly = self._tables
+        (shut, bent, wide), near, partly, sway = self._tables
         light = _reaching(shut, lights[0])
-        if self._rows is not None:
-            some, light = light, np.zeros((len(self._sway), 4), dtype=np.float32)
-            light[self._rows] = some
         if len(lights) > 1:
             still = _reaching(bent, lights[1])
-            light[partly] = still + self._sway[partly, None] * (light[partly] - still)
+            light[partly] = still + sway * (light.take(partly, axis=0) - still)
         if share > 0.0 and len(near):
             before = light.take(near, axis=0)
             light[near] = before + np.float32(share) * (_reaching(wide, lights[0]) - before)
@@ -155,18 +159,23 @@ class FaceLight:
         for rows, outside in zip(self._tongues, out, strict=True):
             if outside.any():
                 light[rows] += (np.array(FREE_LIGHT, dtype=np.float32) - light[rows]) * outside[:, None]
-        return light
+        if self._rows is None:
+            return light
+        spread = np.zeros((len(self._sway), 4), dtype=np.float32)
+        spread.view(ROW)[self._rows] = light.view(ROW)  # whole rows are copied three times faster
+        return spread
 
     @cached_property
-    def _tables(self) -> tuple[tuple[Float32, Float32, Float32], Intp, Intp]:
-        """Visibility with the mouth shut (33, V), the same (33, N) where vertices turn only partly with the
-        head, and with it wide open (33, M) near it; vertices (M,) near the mouth, and those (N,)."""
-        lit = np.full(len(self._sway), self._rows is None)
-        if self._rows is not None:
-            lit[self._rows] = True
-        near, partly = np.flatnonzero(lit & self.baked.near), np.flatnonzero(lit & (self._sway < 1))
-        shut, wide = (_joined(seen) for seen in (self.baked.shut, self.baked.wide))
-        return (shut[lit].T.copy(), shut[partly].T.copy(), wide[near].T.copy()), near, partly
+    def _tables(self) -> tuple[tuple[Float32, Float32, Float32], Intp, Intp, Float32]:
+        """Visibility of the lit vertices with the mouth shut (33, L), the same (33, N) where they turn only
+        partly with the head, and with it wide open (33, M) near it; numbers among the lit ones of those (M,)
+        near the mouth, and of those (N,); the sway (N, 1) of the latter."""
+        lit = slice(None) if self._rows is None else self._rows
+        sway = self._sway[lit]
+        near, partly = np.flatnonzero(self.baked.near[lit]), np.flatnonzero(sway < 1)
+        shut, wide = (_joined(seen)[lit] for seen in (self.baked.shut, self.baked.wide))
+        tables = shut.T.copy(), shut[partly].T.copy(), wide[near].T.copy()
+        return tables, near, partly, sway[partly, None]
 
     def _mouth_open(self, positions: Float32, gaps: tuple[float, float]) -> float:
         if self._lips is None:

@@ -13,7 +13,7 @@ from fba.arrays import Bool, Float32, Float64, Intp
 from fba.body import AttachedHead, BodyModel, BodyPart, attach_head
 from fba.body.head_attachment import skull_of
 from fba.body.skin.skinning import Skinner
-from fba.face import FaceModel, Part
+from fba.face import Deformer, FaceModel, Part
 from fba.parameters import point_rows
 from fba_player._figure._face_parts import cast_coarsely, detail_levels, keep_triangles, make_shape, part_rows
 from fba_player._figure.baked_shapes import load_baked
@@ -53,6 +53,7 @@ class Movers(NamedTuple):
     """
 
     body: Skinner
+    face: Deformer
     head: AttachedHead | None
     light: FaceLight
     finest: int
@@ -85,7 +86,7 @@ class Person:
 
     def joints(self, faps: Float32, matrices: Float64) -> Float64:
         """Return the joint matrices (J, 4, 4) with the head turned on the skull base by FAPs (68,)."""
-        turn = self.figure.pose(faps).turn
+        turn = self.figure.deformer.head_matrices(faps)
         if self.head is None:
             return turn_own_head(self.body, matrices, turn)
         return self.head.matrices(matrices, turn)
@@ -120,28 +121,25 @@ class Person:
         ]
         if movers.head is None:
             return meshes
-        pose = self.figure.pose(faps)
+        pose = self.figure.pose(faps, movers.face, self._least_gap(joints, seen))
         positions, normals = np.empty_like(pose.positions), np.empty_like(pose.positions)
         movers.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
-        light = self.figure.shade(faps, self.frame(joints), movers.light)
+        light = movers.light.shade(pose.positions, np.eye(3), self.frame(joints)[:3, :3])
         wrinkles = wrinkle_strengths(faps)
-        shut = self._has_shut_lips(pose.positions, joints, seen)
         for name, shape in self.face_shapes.items():
-            if shut and shape.kind in WITHIN_LIPS:
+            if pose.shut and shape.kind in WITHIN_LIPS:
                 continue
             rows = self.figure.rows(name)
             more = {"wrinkles": wrinkles, "finest": movers.finest}
             meshes.append(_mesh_in_world(shape, rows, positions, normals, light, **more))
         return meshes
 
-    def _has_shut_lips(self, positions: Float32, joints: Float64, seen: Seen | None) -> bool:
-        """Return whether nothing is seen between the lips of a face (V, 3) from there."""
-        lips = self.figure.light.lips
-        if seen is None or not lips:
-            return False
+    def _least_gap(self, joints: Float64, seen: Seen | None) -> float:
+        """Return how far apart (m) lips must be for something to be seen between them from there."""
+        if seen is None:
+            return 0.0
         away = np.linalg.norm(joints[skull_of(self.body), :3, 3] - seen.eye)
-        apart = np.linalg.norm(positions[lips[0]] - positions[lips[1]])
-        return bool(apart < SHUT_PIXELS * seen.pixel * away)
+        return float(SHUT_PIXELS * seen.pixel * away)
 
     def _choose_movers(self, joints: Float64, seen: Seen | None) -> Movers:
         """Return what moves the vertices of all levels of detail that may be drawn from there."""
@@ -158,17 +156,18 @@ class Person:
         return self._movers[levels]
 
     def _make_movers(self, levels: tuple[int, ...]) -> Movers:
-        head, light = self.head, self.figure.light
+        head, light, deformer = self.head, self.figure.light, self.figure.deformer
         if not any(levels):
-            return Movers(self.body.skinner, head, light, 0)
+            return Movers(self.body.skinner, deformer, head, light, 0)
         of_face = levels[len(self.body_shapes) :]
         body = _needed(self.body_shapes, levels[: len(self.body_shapes)], self.body)
         face = _needed(self.face_shapes, of_face, self.figure.model)
         if head is not None:
             head, light = replace(head, skinner=head.skinner.restrict(face)), light.restrict(face)
+            deformer = self.figure.restrict(face)
         faces = zip(of_face, self.face_shapes.values(), strict=True)
         finest = max((level for level, shape in faces if shape.levels), default=0)
-        return Movers(self.body.skinner.restrict(body), head, light, finest)
+        return Movers(self.body.skinner.restrict(body), deformer, head, light, finest)
 
     @cached_property
     def _reach(self) -> float:

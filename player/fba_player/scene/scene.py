@@ -174,7 +174,7 @@ class Scene(Timed[Timeline]):
         if not self.has_body:
             return face
         faps, joints = self._pose_at(time)
-        matrix = self._face_matrix(joints) @ self.figure.pose(faps).turn
+        matrix = self._face_matrix(joints) @ self.figure.deformer.head_matrices(faps)
         x, y, z = (matrix @ np.array([*face.centre, 1.0]))[:3].tolist()
         return Subject((x, y, z), face.half_height, face.half_width)
 
@@ -226,9 +226,10 @@ class Scene(Timed[Timeline]):
             world = np.eye(4)
             return View(eyes=self.figure.eyes(faps, world), faces=self.figure.meshes(faps, world))
         turned = self.person.joints(faps, joints)
+        faces = self.person.meshes(faps, turned, seen)  # first: the eyes take the vertices moved for it
         return View(
             eyes=self.person.eyes(faps, turned),
-            faces=self.person.meshes(faps, turned, seen),
+            faces=faces,
             blobs=self._bones.shadows(joints),
             ground=True,
         )

@@ -314,6 +314,22 @@ def test_targets_that_do_not_fit_are_refused() -> None:
         deformer(np.zeros(68), out=good, normals=good)
 
 
+@pytest.mark.parametrize("count", [0, 1, 40, 3000])
+def test_a_deformer_of_some_vertices_moves_them_alike(count: int) -> None:
+    every = Deformer(FaceModel.default())
+    random = np.random.default_rng(count)
+    faps, size = random.integers(-400, 400, (3, 68)), len(every.model.vertices)
+    rows = random.choice(size, count, replace=False)
+    positions, normals = shaded(every, faps)
+    out, units = np.full((2, *positions.shape), np.nan, np.float32)
+    every.restrict(rows)(faps, out, units)
+    np.testing.assert_array_equal(out[:, rows], positions[:, rows])
+    np.testing.assert_array_equal(units[:, rows], normals[:, rows])
+    assert np.isnan(out).all(axis=2).sum() == 3 * (size - count)
+    with pytest.raises(IndexError):
+        every.restrict([size])
+
+
 def test_no_allocation_when_arrays_are_given() -> None:
     deformer = lively()
     count = len(deformer.model.vertices)

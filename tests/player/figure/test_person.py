@@ -112,16 +112,18 @@ def test_real_clips_stand_on_the_ground(shared: Path) -> None:
         assert -0.06 < lowest < 0.06
 
 
+@pytest.mark.parametrize("face", [{3: 600, 5: -900, 19: 500}, {3: 900, 5: -900, 45: 700, 46: 600}, {46: 600}])
 @pytest.mark.parametrize("away", [0.7, 1.0, 5.0, 12.0, 40.0])
-def test_what_is_moved_for_a_distance_is_drawn_as_if_all_were(away: float) -> None:
+def test_what_is_moved_for_a_distance_is_drawn_as_if_all_were(away: float, face: dict[int, int]) -> None:
     """The vertices of the levels of detail that are chosen there, and those of a body's shadow."""
-    pose, face = {32: 9000, 60: 90000, 61: -40000}, {3: 600, 5: -900, 19: 500}
+    pose = {32: 9000, 60: 90000, 61: -40000}
     scene = Scene(Animation(25, np.arange(1), face_track([face]), body_track([pose])))  # type: ignore[arg-type]
     seen = Seen(np.array([0.3, 1.2, away]), 0.0006)
     every, some = scene.view_at(0.0), scene.view_at(0.0, seen)
     assert (some.faces[-1].finest > 0) == (away > 3)
-    details = Details()
-    for one, other in zip(*(details.choose(v.faces, *seen) for v in (every, some)), strict=True):
+    details, shapes = Details(), [mesh.shape for mesh in some.faces]
+    faces = [mesh for mesh in every.faces if mesh.shape in shapes]  # without teeth behind shut lips
+    for one, other in zip(*(details.choose(f, *seen) for f in (faces, some.faces)), strict=True):
         assert one.shape is other.shape
         used = np.unique(one.shape.triangles)
         for field in ("positions", "normals"):

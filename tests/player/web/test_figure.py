@@ -430,7 +430,8 @@ def _compare_person(
     pose = person.figure.pose(faps)
     body, face = np.empty_like(person.body.vertices), np.empty_like(pose.normals)
     body_normals, face_normals = np.empty_like(body), np.empty_like(face)
-    light = person.figure.shade(faps, person.frame(joints))[packed.face_rows]
+    turn = person.frame(joints)[:3, :3]
+    light = person.figure.light.shade(pose.positions, np.eye(3), turn)[packed.face_rows]
     errors.add("light", np.abs(row[-4 * len(light) :].reshape(-1, 4) - light))
     person.body.skin(joints, body, body_normals)
     person.head.skin(pose.positions, joints, face, local_normals=pose.normals, normals=face_normals)
