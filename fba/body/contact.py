@@ -188,8 +188,9 @@ def _measure_parts(body: BodyModel, vertices: Float64, arm: Float64) -> Parts:
         centre = skeleton.centres[number]
         ends = [skeleton.centres[skeleton.number(low), 1] + above_low,
                 skeleton.centres[skeleton.number(high), 1] + above_high]  # fmt: skip
-        whole = chosen[body.triangles].all(axis=1)
-        samples = _samples(vertices, body.triangles[whole].astype(np.int64))
+        corners = vertices[body.triangles[chosen[body.triangles].all(axis=1)]]
+        heights = corners[:, :, 1]
+        samples = _samples(corners[(heights.max(axis=1) > ends[0]) & (heights.min(axis=1) < ends[1])])
         samples = samples[(samples[:, 1] > ends[0]) & (samples[:, 1] < ends[1])] - centre
         if len(samples):
             ends = [end - centre[1] for end in ends]
@@ -206,11 +207,11 @@ def _measure_parts(body: BodyModel, vertices: Float64, arm: Float64) -> Parts:
     )
 
 
-def _samples(vertices: Float64, triangles: Int64) -> Float64:
-    """Return (N, 3) points spread over triangles (F, 3)."""
+def _samples(corners: Float64) -> Float64:
+    """Return (N, 3) points spread over triangles with corners (F, 3, 3)."""
     steps = 5
     shares = np.array([(a, b, steps - a - b) for a in range(steps + 1) for b in range(steps + 1 - a)]) / steps
-    return np.asarray(np.einsum("sk,fkd->fsd", shares, vertices[triangles]).reshape(-1, 3))
+    return np.asarray(np.tensordot(shares, corners, (1, 1)).reshape(-1, 3))
 
 
 def _radii(samples: Float64, ends: Sequence[float]) -> Float64:
