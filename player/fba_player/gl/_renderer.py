@@ -200,6 +200,7 @@ class Renderer:
             set_uniform(program, "unproject", matrix_bytes(np.linalg.inv(matrix)))
             set_uniform(program, "ground", 1.0 if view.ground else 0.0)
             set_uniform(program, "centre", centre)
+            set_uniform(program, "size", size)
             gl.viewport = (0, 0, *size)
             gl.enable_only(gl.NOTHING)
             self._studio.render()
