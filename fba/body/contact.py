@@ -24,6 +24,7 @@ import numpy as np
 from fba.arrays import Bool, Float64, Int64
 from fba.body._skeleton import SIDES
 from fba.compiled import compiled, inlined
+from fba.rotations import lengths
 
 if TYPE_CHECKING:
     from fba.body._model import BodyModel
@@ -163,10 +164,11 @@ def _spread(vertices: Float64, chosen: Bool, count: int) -> Int64:
     rows = np.flatnonzero(chosen)
     if not len(rows):
         return rows
-    away = np.linalg.norm(vertices[rows] - vertices[rows].mean(axis=0), axis=1)
+    places = vertices[rows]
+    away = lengths(places - places.mean(axis=0))
     found = [int(away.argmax())]
     for _ in range(min(count, len(rows)) - 1):
-        last = np.linalg.norm(vertices[rows] - vertices[rows[found[-1]]], axis=1)
+        last = lengths(places - places[found[-1]])
         away = last if len(found) == 1 else np.minimum(away, last)
         found.append(int(away.argmax()))
     return np.asarray(rows[found])
@@ -188,8 +190,11 @@ def _measure_parts(body: BodyModel, vertices: Float64, arm: Float64) -> Parts:
         centre = skeleton.centres[number]
         ends = [skeleton.centres[skeleton.number(low), 1] + above_low,
                 skeleton.centres[skeleton.number(high), 1] + above_high]  # fmt: skip
-        whole = chosen[body.triangles].all(axis=1)
-        samples = _samples(vertices, body.triangles[whole].astype(np.int64))
+        above, below = vertices[:, 1] > ends[0], vertices[:, 1] < ends[1]
+        a, b, c = body.triangles.T  # several times as fast as any and all over an axis
+        used = chosen[a] & chosen[b] & chosen[c] & (above[a] | above[b] | above[c])
+        used &= below[a] | below[b] | below[c]
+        samples = _samples(vertices[body.triangles[used]])
         samples = samples[(samples[:, 1] > ends[0]) & (samples[:, 1] < ends[1])] - centre
         if len(samples):
             ends = [end - centre[1] for end in ends]
@@ -206,11 +211,11 @@ def _measure_parts(body: BodyModel, vertices: Float64, arm: Float64) -> Parts:
     )
 
 
-def _samples(vertices: Float64, triangles: Int64) -> Float64:
-    """Return (N, 3) points spread over triangles (F, 3)."""
+def _samples(corners: Float64) -> Float64:
+    """Return (N, 3) points spread over triangles with corners (F, 3, 3)."""
     steps = 5
     shares = np.array([(a, b, steps - a - b) for a in range(steps + 1) for b in range(steps + 1 - a)]) / steps
-    return np.asarray(np.einsum("sk,fkd->fsd", shares, vertices[triangles]).reshape(-1, 3))
+    return np.asarray(np.tensordot(shares, corners, (1, 1)).reshape(-1, 3))
 
 
 def _radii(samples: Float64, ends: Sequence[float]) -> Float64:
@@ -221,6 +226,8 @@ def _radii(samples: Float64, ends: Sequence[float]) -> Float64:
     radii = np.zeros((LEVELS, AROUND))
     np.maximum.at(radii, (level, column), np.hypot(samples[:, 0], samples[:, 2]))
     for _ in range(LEVELS):
+        if radii.all():
+            break
         beside = np.maximum(np.roll(radii, 1, axis=1), np.roll(radii, -1, axis=1))
         padded = np.pad(radii, ((1, 1), (0, 0)))
         radii = np.where(radii > 0, radii, np.where(beside > 0, beside, np.maximum(padded[2:], padded[:-2])))

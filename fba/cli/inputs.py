@@ -146,8 +146,6 @@ def read_file(
     rate: to which the animation is resampled, and motion capture before it is retargeted. name: of a file
     without a name. capture: options for the readers of motion capture.
     """
-    from fba.codec import marked_table
-
     limits = reading.limit
     table: BapTable | None = None
     marked: BapTable | None = None
@@ -156,6 +154,8 @@ def read_file(
     with input_file(path) as file:
         reader = find_format(file, reading.format)
         if reader.read_stream is not None:
+            from fba.codec import marked_table
+
             data = read_stream(file, reading, reader)
             marked = marked_table(data)
             table = step_tables.table_to_read(path, data, reading.bap_steps, limits)

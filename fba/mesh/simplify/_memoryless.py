@@ -301,9 +301,12 @@ def _nearest(
     count = max(int(flat.max(initial=-1)), int(own.max(initial=-1))) + 1
     if not len(corners) or min(int(flat.min()), int(own.min(initial=0))) < 0:
         raise ModelError("no triangle is left around a vertex of the mesh")
+    first, second, third = owners.T
+    again = np.stack([first < 0, second == first, (third == first) | (third == second)], axis=1)
+    flat = np.where(again.ravel(), count, flat)  # a triangle is tried once for a list that it is in twice
     lists = np.argsort(flat, kind="stable") // 3  # the triangles of one list after the other
-    lengths = np.bincount(flat, minlength=count)[own]
-    starts = (np.cumsum(np.bincount(flat, minlength=count)) - np.bincount(flat, minlength=count))[own]
+    counts = np.bincount(flat, minlength=count)
+    lengths, starts = counts[own], (np.cumsum(counts) - counts)[own]
     triangle, weights = np.zeros(len(positions), dtype=np.intp), np.zeros((len(positions), 3))
     weights[:, 0] = 1.0  # of the first triangle, for what has none
     point = np.repeat(np.arange(len(positions)), lengths)

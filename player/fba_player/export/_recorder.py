@@ -12,14 +12,16 @@ from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from fba.arrays import UInt8
 from fba.atomic import PathLike
 from fba.errors import UnsupportedError
-from fba_player.sound.soundtrack import FilmedSound
+
+if TYPE_CHECKING:
+    from fba_player.sound.soundtrack import FilmedSound
 
 MAX_WAITING_PICTURES = 6
 """Largest number of pictures that wait for the encoder."""

@@ -61,8 +61,8 @@ class GroundShadow:
 
     def __init__(self, context: Any) -> None:
         self._gl = context
-        self._heights = context.texture((TEXELS, TEXELS), 2, dtype="f2")
-        self._tops = context.texture((TEXELS, TEXELS), 4, dtype="f4")
+        # Both of one format: software OpenGL compiles the halving of each format at every start.
+        self._heights, self._tops = (context.texture((TEXELS, TEXELS), 4, dtype="f4") for _ in range(2))
         self._darkness, self._contact = (
             context.texture((cells, cells), 1, alignment=1) for cells in (CELLS, NEAR_CELLS)
         )

@@ -63,6 +63,7 @@ class Renderer:
         )
         self._ground_shadow = GroundShadow(context)
         self._backdrop: tuple[tuple[object, ...], Any, Any] | None = None
+        self._studio_key: tuple[object, ...] = ()
         studio = self._programs["studio"]
         self._studio = context.vertex_array(studio, [(self._studio_buffer, "2f", "in_corner")])
         self._instances = context.buffer(reserve=CAPSULE_FLOATS * 4 * 128, dynamic=True)
@@ -180,7 +181,7 @@ class Renderer:
     def _draw_studio(
         self, view: View, matrix: Float64, size: tuple[int, int], centre: tuple[float, float]
     ) -> Shade | None:
-        """Draw backdrop and ground, cached for the last camera, and shadows; see `_draw_shadows`.
+        """Draw backdrop and ground, cached while the camera stays, and shadows; see `_draw_shadows`.
 
         centre: x and z of the ground's brightest point.
         """
@@ -190,18 +191,22 @@ class Renderer:
             return self._draw_shadows(view, matrix)
         target = gl.fbo
         key = (size, view.ground, matrix.tobytes(), centre)
+        before, self._studio_key = self._studio_key, key
         if self._backdrop is None or self._backdrop[0] != key:
-            buffer, framebuffer = self._backdrop_buffer(size)
-            self._backdrop = (key, buffer, framebuffer)
+            if before == key:  # kept from the second picture on: to copy it takes time, too
+                self._backdrop = (key, *self._backdrop_buffer(size))
+                self._backdrop[2].use()
             program = self._programs["studio"]
             set_uniform(program, "unproject", matrix_bytes(np.linalg.inv(matrix)))
             set_uniform(program, "ground", 1.0 if view.ground else 0.0)
             set_uniform(program, "centre", centre)
-            framebuffer.use()
+            set_uniform(program, "size", size)
             gl.viewport = (0, 0, *size)
             gl.enable_only(gl.NOTHING)
             self._studio.render()
-        gl.copy_framebuffer(target, self._backdrop[2])
+        if before == key:
+            assert self._backdrop is not None
+            gl.copy_framebuffer(target, self._backdrop[2])
         target.use()
         gl.viewport = (0, 0, *size)
         return self._draw_shadows(view, matrix)

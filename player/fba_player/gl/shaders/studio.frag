@@ -2,9 +2,8 @@
 //include lighting.glsl
 uniform float ground;          // 1 where there is a ground
 uniform vec2 centre;           // where the ground is brightest, x and z
-in vec2 corner;
-in vec3 near_;
-in vec3 far_;
+uniform mat4 unproject;
+uniform vec2 size;             // pixels
 out vec4 pixel;
 
 float line(float at, float wide) {
@@ -14,6 +13,9 @@ float line(float at, float wide) {
 }
 
 void main() {
+    vec2 corner = gl_FragCoord.xy / size * 2.0 - 1.0;  // varyings would differ in the last bit with samples
+    vec4 nearest = unproject * vec4(corner, -1.0, 1.0), furthest = unproject * vec4(corner, 1.0, 1.0);
+    vec3 near_ = nearest.xyz / nearest.w, far_ = furthest.xyz / furthest.w;
     vec3 backdrop = mix(vec3(0.155, 0.165, 0.185), vec3(0.42, 0.44, 0.475), smoothstep(-1.1, 1.0, corner.y));
     backdrop *= 1.0 - 0.30 * dot(corner, corner) * 0.5;
     vec3 colour = backdrop;
