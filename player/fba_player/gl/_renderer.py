@@ -37,7 +37,7 @@ MIN_MARK_RADIUS = 0.9
 MARK_LIFT = 0.003
 """Marks are drawn over surfaces that hide them by less than this (m)."""
 EYE_ROWS, SMALL_EYE = ((20, 32), (8, 14)), 6.0
-"""Rows and columns of vertices of an eyeball, and of one whose radius is less than so many pixels."""
+"""Rows and columns of vertices of an eyeball, and of one whose radius is below this number of pixels."""
 CACHED_SHAPES = 32
 """Number of meshes whose buffers are cached; the least recently used goes first."""
 
@@ -292,7 +292,7 @@ class Renderer:
         gl.enable_only(gl.DEPTH_TEST)
 
     def _make_eyeball(self, rows: int, around: int) -> tuple[Any, Any, Any]:
-        """Return the vertex array of a sphere of so many vertices, and its buffers."""
+        """Return the vertex array of a sphere, and its buffers. rows, around: numbers of vertices."""
         vertices, inward = sphere_mesh(rows, around)
         points, triangles = _make_buffers(self._gl, vertices, inward[:, ::-1])
         attributes = [(points, "3f", "in_position")]
