@@ -41,7 +41,7 @@ NEARER = 1.5
 MOST_MOVERS = 8
 """How many choices of vertices are kept, a few megabytes each."""
 WITHIN_LIPS, SHUT_PIXELS = ("teeth", "tongue"), 0.5
-"""Kinds of a face's parts that are left out where its lips are less than so many pixels apart."""
+"""Kinds of a face's parts that are left out where its lips are closer than this number of pixels."""
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
