@@ -19,10 +19,10 @@ HINGES = (
 over which weights change from one to the other, on the side that folds and on the one that stretches."""
 LIMB = 0.06
 """Approximate distance from bone to skin, metres."""
-ARMHOLE = (0.026, 0.080)
+ARMHOLE = (0.026, 0.068)
 """Metres to both sides of a sleeve's seam over which weights change from trunk to arm: at the armpit and at
 the top."""
-SET = (0.020, -0.012)
+SET = (0.020, 0.045)
 """Metres from the shoulder outwards to that seam: at the armpit and at the top."""
 BEHIND = 0.022
 """How much further out it is at the back of the armpit, which an arm in front would carry downwards."""

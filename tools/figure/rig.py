@@ -41,7 +41,7 @@ LEFT = 0.75
 """Share that remains of its distance beyond SIDE, at the upper of these heights."""
 SIDE = -0.010
 """Metres out from the joint from which that distance is measured."""
-DROP, DROPPED = 0.025, (0.02, 0.055)
+DROP, DROPPED = 0.020, (0.02, 0.055)
 """Metres by which the end of the shoulder is lowered, how far within the joint, and over which distance."""
 COLLAR = 0.085
 """Metres from the midline within which it stays: the neck, which a head brings, goes under a collar there."""
