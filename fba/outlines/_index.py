@@ -234,7 +234,8 @@ def build_index(
         for frame in frames:
             vertices = figure.vertices(poses.faps[frame], poses.baps[frame])
             for view in views:
-                mask = draw_silhouette(vertices, figure.triangles, view)
+                # A lock of hair that ends between pixels leaves a row empty: fit again, as queries are.
+                mask = fit_mask(draw_silhouette(vertices, figure.triangles, view))
                 masks.append(pack_mask(mask))
                 descriptions.append(describe_points(mask))
                 if progress is not None:

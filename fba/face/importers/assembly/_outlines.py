@@ -299,6 +299,9 @@ def _head(vertices: Float64, pupils: Float64, apart: float) -> dict[str, Float64
         out = (vertices[:, 0] - pupils[0]) * sign
         if ears.any() and temple.any():
             tip = int(np.where(ears, out, -np.inf).argmax())
+            stands_out = ears & (out > out[temple].max())
             if out[tip] > out[temple].max() + 0.05 * apart:
-                result[name] = vertices[tip]
+                # What stands out most is the upper rim; the point is half way down.
+                height = vertices[stands_out, 1]
+                result[name] = np.array([vertices[tip, 0], (height.min() + height.max()) / 2, vertices[tip, 2]])
     return result
