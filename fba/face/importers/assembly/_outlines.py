@@ -303,5 +303,7 @@ def _head(vertices: Float64, pupils: Float64, apart: float) -> dict[str, Float64
             if out[tip] > out[temple].max() + 0.05 * apart:
                 # What stands out most is the upper rim; the point is half way down.
                 height = vertices[stands_out, 1]
-                result[name] = np.array([vertices[tip, 0], (height.min() + height.max()) / 2, vertices[tip, 2]])
+                result[name] = np.array(
+                    [vertices[tip, 0], (height.min() + height.max()) / 2, vertices[tip, 2]]
+                )
     return result
