@@ -204,8 +204,7 @@ class Renderer:
             gl.viewport = (0, 0, *size)
             gl.enable_only(gl.NOTHING)
             self._studio.render()
-        if before == key:
-            assert self._backdrop is not None
+        if self._backdrop is not None and self._backdrop[0] == key:
             gl.copy_framebuffer(target, self._backdrop[2])
         target.use()
         gl.viewport = (0, 0, *size)
