@@ -78,6 +78,14 @@ def test_script_runs_as_it_is(script: str, shell: str) -> None:
     assert subprocess.run([shell, "-n", path], capture_output=True, text=True, check=False).stderr == ""
 
 
+@pytest.mark.parametrize("name", STAGES)
+def test_stages_name_tests_that_exist(name: str) -> None:
+    """Else pytest runs none of the others."""
+    patterns = re.findall(r"\btests/[^\s\\]+", (ROOT / name).read_text(encoding="utf-8"))
+    words = subprocess.check_output(["bash", "-c", f"echo {' '.join(patterns)}"], cwd=ROOT, text=True).split()
+    assert [word for word in words if not (ROOT / word).exists()] == []
+
+
 def test_ci_leaves_to_the_coverage_what_that_runs() -> None:
     """On the oldest Python, each test runs in one stage, but for long ones and those of the documentation."""
     rooms = re.search(r"rooms='([^']*)'", (ROOT / "dev").read_text(encoding="utf-8"))

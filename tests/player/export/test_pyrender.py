@@ -39,6 +39,7 @@ for name, (animation, camera, size) in cases.items():
     ours = player.Scene(animation)
     ours.show("background", "transparent")
     ours.show("shadows", False)
+    ours.show("lod", "full")
     with player.Offscreen(ours, size, camera, samples=4) as view:
         picture = view.frame(0.0)
     one, other = depth > 0, picture[..., 3] > 127

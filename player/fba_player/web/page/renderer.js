@@ -125,6 +125,7 @@ export class Renderer {
     program.matrix("unproject", invert(this._camera));
     program.set("ground", Number(view.ground));
     program.set("centre", [camera.target[0], camera.target[2]]);
+    program.set("size", [this._gl.drawingBufferWidth, this._gl.drawingBufferHeight]);
     this._gl.bindVertexArray(this._triangle);
     this._gl.drawArrays(this._gl.TRIANGLES, 0, 3);
   }
