@@ -23,7 +23,6 @@ from fba.face.eyeball import PUPIL_FAP
 from fba.face.importers.assembly._repair import repair_tables, take_sounder
 from fba.face.model import DetailLevel, FaceModel, shape_key
 from fba.face.simplification._tables import close_lids, find_balls, find_lines, fit_tables
-from fba.mesh import connected
 from fba.mesh.simplify import (
     Level,
     Simplification,
@@ -64,10 +63,6 @@ TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""
 HAIRS = ("lash", "brow")
 """Kinds of parts that do not count in a level's error."""
-LOCK_TRIANGLES = 16
-"""Hair of pieces with fewer triangles than this, on average, is locks that lie upon other hair."""
-LOCK_COST = 1e-5
-"""Importance of such locks: they go first, each as a whole, as the hair below them stays."""
 OTHER_SHARE = 0.2
 """The same for hair, clothes and what else is worn."""
 RIM_VERTICES = 16
@@ -256,10 +251,4 @@ def _importance(model: FaceModel) -> Float64:
         for part in model.of_kind(kind):
             start = model.starts[part.name]
             share[start : start + len(part.vertices)] = counts
-    importance = 1.0 + IMPORTANCE * share**2
-    for part in model.of_kind("hair"):
-        edges = part.triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
-        if len(part.triangles) <= LOCK_TRIANGLES * len(np.unique(connected(edges, len(part.vertices)))):
-            start = model.starts[part.name]
-            importance[start : start + len(part.vertices)] = LOCK_COST
-    return importance
+    return 1.0 + IMPORTANCE * share**2
