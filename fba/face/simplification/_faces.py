@@ -64,7 +64,7 @@ TONGUE_SHARE = 0.2
 HAIRS = ("lash", "brow")
 """Kinds of parts that do not count in a level's error."""
 OTHER_SHARE = 0.2
-"""The same for hair, clothes and what else is worn."""
+"""The same for clothes and what else is worn."""
 RIM_VERTICES = 16
 """Vertices of a pupil's rim that stay."""
 LEVEL_RATIO = 0.32
@@ -245,7 +245,6 @@ def _importance(model: FaceModel) -> Float64:
         ("lash", LASH_SHARE),
         ("teeth", TEETH_SHARE),
         ("tongue", TONGUE_SHARE),
-        ("hair", OTHER_SHARE),
         ("other", OTHER_SHARE),
     ):
         for part in model.of_kind(kind):
