@@ -158,8 +158,8 @@ def _complexion(p: Float64, looks: Looks) -> Float64:
         ((84, -15, -98), 44, 0.12), ((0, 40, 12), 40, 0.10),
     ):  # fmt: skip
         colour = _blend(colour, np.array(looks.blush), _spot(p, centre, radius) * share * broad)
-    colour += np.array([6.5, 5.4, 4.6]) * (noise(p, 0.018, 2) * 0.9 + noise(p, 0.007, 3) * 0.9)[:, None]
-    red = noise(p, 0.0042, 4)[:, None] * np.array([2.2, -5.4, -5.4])
+    colour += np.array([3.4, 2.8, 2.4]) * (noise(p, 0.018, 2) * 0.9 + noise(p, 0.007, 3) * 0.9)[:, None]
+    red = noise(p, 0.0042, 4)[:, None] * np.array([1.4, -3.2, -3.2])
     fine = noise(p, 0.0011, 5)[:, None] * np.array([4.2, 4.2, 4.0])
     pores = np.clip(noise(p, 0.00065, 6) - 0.45, 0, 1)[:, None]
     nose = np.clip(_spot(p, (6, -34, 24), 26) + _spot(p, (28, -34, 6), 26) * 0.7, 0, 1)[:, None]
