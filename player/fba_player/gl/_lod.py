@@ -130,9 +130,8 @@ class Details:
         if before is None or not share_memory(before[0], mesh.light):
             before = mesh.light, _mean(mesh.light, level.rows, level.weights)
             self._lights[level.shape] = before
-        normals = _mean(mesh.normals, level.rows, level.weights)
-        positions = _mean(mesh.positions, level.rows, level.weights)
-        positions += level.heights[:, None] * normals
+        positions, normals = (np.zeros((len(level.rows), 3), dtype=np.float32) for _ in range(2))
+        _place(mesh.positions, mesh.normals, level.rows, level.weights, level.heights, positions, normals)
         return mesh._replace(
             shape=level.shape, positions=positions, normals=normals, light=before[1], away=away
         )
@@ -210,6 +209,24 @@ def _mean(values: Float32, rows: Int32, weights: Float32) -> Float32:
     means = np.zeros((len(rows), values.shape[1]), dtype=np.float32)
     _add_means(values, rows, weights, means)
     return means
+
+
+@compiled
+def _place(
+    positions: Float32,
+    normals: Float32,
+    rows: Int32,
+    weights: Float32,
+    heights: Float32,
+    placed: Float32,
+    turned: Float32,
+) -> None:
+    """Add to (M, 3) positions and normals, 0 before, those of a level; see `CoarseShape`."""
+    _add_means(normals, rows, weights, turned)
+    _add_means(positions, rows, weights, placed)
+    for i in range(len(rows)):
+        for column in range(3):
+            placed[i, column] += heights[i] * turned[i, column]
 
 
 @compiled
