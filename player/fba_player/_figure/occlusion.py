@@ -81,7 +81,8 @@ def harmonics(directions: Float64) -> Float64:
 
 def weights(directions: Float64) -> Float64:
     """Return float64 (N, 16): weights for rows of `Visibility`, for few large lights in directions (N, 3)."""
-    return np.array([harmonics_at(*direction) for direction in directions.tolist()]) * FACTORS
+    values = [harmonics_at(*direction) for direction in directions.tolist()]
+    return np.asarray(np.array(values) * FACTORS)
 
 
 def harmonics_at(x: Any, y: Any, z: Any) -> tuple[Any, ...]:
