@@ -140,7 +140,7 @@ def _iris_tint(part: Part, centre: Float64, radius: float) -> tuple[float, float
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The face shown for FAPs (68,): positions and normals, float32 (V, 3), without the head's turn (4, 4).
+    """The face shown for FAPs (68,): positions and normals, float32 (V, 3), without the head's `turn`.
 
     Lids follow the gaze, and the tongue keeps between teeth and lips, if something is seen between these.
     gap: metres between the lips, infinite where they are not known. shut: whether nothing is seen. deformer:
@@ -150,10 +150,14 @@ class Pose:
     faps: Float32
     positions: Float32
     normals: Float32
-    turn: Float64
     gap: float
     shut: bool
     deformer: Deformer
+
+    @cached_property
+    def turn(self) -> Float64:
+        """(4, 4), the head's."""
+        return self.deformer.head_matrices(self.faps)
 
 
 @dataclass(eq=False)
@@ -232,8 +236,7 @@ class FaceFigure:
         gap = float(np.linalg.norm(positions[lips[0]] - positions[lips[1]])) if lips else math.inf
         for tongue in self.tongues if gap >= least_gap else ():
             tongue.bend(positions, normals, faps)
-        turn = self.deformer.head_matrices(faps)
-        return Pose(faps, positions, normals, turn, gap, gap < least_gap, deformer)
+        return Pose(faps, positions, normals, gap, gap < least_gap, deformer)
 
     def meshes(
         self, faps: Float32, matrix: Float64, *, on_body: bool = False, without: Sequence[str] = ()

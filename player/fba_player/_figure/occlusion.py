@@ -7,7 +7,7 @@ soft shadows of large lights then cost a few products for each vertex, whichever
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,8 @@ PIXEL_SIZE = 0.0014
 """Size of a depth map's pixel, metres: finer than the folds that are to be shaded."""
 MAX_DEPTH_PIXELS = 400
 """Largest width of a depth map, pixels."""
-SOFTNESS = (1.0, 0.92, 0.72, 0.46)
-"""Factor for each band of the harmonics, for a light some 40 degrees wide."""
+FACTORS = np.repeat((1.0, 0.92, 0.72, 0.46), (1, 3, 5, 7))
+"""Factor for each harmonic, by its band, for a light some 40 degrees wide."""
 SKIN_DEPTH = 0.0045
 """Depth (m) at which light through skin has faded to 1/e."""
 HARMONICS = 16
@@ -74,16 +74,21 @@ def bake(vertices: Float32, normals: Float32, triangles: Int32, within: Bool | N
     return Visibility(visible @ basis, through @ basis, free.astype(np.float32))
 
 
-def weights(directions: Float64) -> Float64:
-    """Return float64 (N, 16): weights for rows of `Visibility`, for large lights in directions (N, 3)."""
-    return np.asarray(harmonics(directions) * np.repeat(SOFTNESS, [1, 3, 5, 7]))
-
-
 def harmonics(directions: Float64) -> Float64:
     """Return float64 (N, 16): real spherical harmonics up to the third band at unit vectors (N, 3)."""
-    x, y, z = directions.T
-    values = (
-        np.full_like(x, 0.282095),
+    return np.stack(np.broadcast_arrays(*harmonics_at(*directions.T)), axis=1)
+
+
+def weights(directions: Float64) -> Float64:
+    """Return float64 (N, 16): weights for rows of `Visibility`, for few large lights in directions (N, 3)."""
+    values = [harmonics_at(*direction) for direction in directions.tolist()]
+    return np.asarray(np.array(values) * FACTORS)
+
+
+def harmonics_at(x: Any, y: Any, z: Any) -> tuple[Any, ...]:
+    """Return the harmonics in a direction, or in many, of arrays: for few these take much longer."""
+    return (
+        0.282095,
         0.488603 * y,
         0.488603 * z,
         0.488603 * x,
@@ -100,7 +105,6 @@ def harmonics(directions: Float64) -> Float64:
         1.445306 * z * (x * x - y * y),
         0.590044 * x * (x * x - 3 * y * y),
     )
-    return np.stack(values, axis=1)
 
 
 @cache

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fba.arrays import Float32, Int32, Intp, UInt8
+from fba.mesh.simplify import TOLERANCES, DetailLevels
 from fba.rotations import unit
 from fba_player._figure.face_light import KEY_DIRECTION
 from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniforms, write_buffer
@@ -31,6 +32,8 @@ WIDTH = 4.0
 """Metres of ground, along each side, for one body."""
 COARSE = 2.4
 """Shadows are cast coarsely on ground that is wider than this, in multiples of `WIDTH`."""
+MAX_COARSE_ERROR = TOLERANCES[-2]
+"""Largest error (m) of what casts the shadow of one body among several."""
 CONTACT = 1.12
 """Metres, along each side, of the ground that is looked at finely around feet; twice that in long steps."""
 BEYOND = 0.5
@@ -208,10 +211,19 @@ class GroundShadow:
 def _casting(shape: FaceShape, coarsely: bool) -> tuple[Intp, Int32]:
     """Return the vertices (N,) of the triangles that cast a shape's shadow, and these triangles of them."""
     triangles = shape.triangles if shape.outer is None else shape.outer
-    if coarsely and shape.outermost is not None:
-        triangles = shape.outermost()
+    if coarsely and shape.outer is not None and shape.points is not None:
+        triangles = _close_and_simplify(shape.points, shape.outer)
     rows, corners = np.unique(triangles, return_inverse=True)
     return rows.astype(np.intp), corners.reshape(-1, 3).astype(np.int32)
+
+
+def _close_and_simplify(points: Float32, triangles: Int32) -> Int32:
+    """Return int32 (F, 3): fewer triangles, in which seams are closed; else all their vertices would stay."""
+    rows, corners = np.unique(triangles, return_inverse=True)
+    places, first, same = np.unique(points[rows], axis=0, return_index=True, return_inverse=True)
+    closed = same.ravel()[corners].reshape(-1, 3).astype(np.int32)
+    fewer = DetailLevels(places, 1, closed).triangles_within(MAX_COARSE_ERROR)
+    return np.asarray(rows[first][closed if fewer is None else fewer], dtype=np.int32)
 
 
 def _casts(mesh: FaceMesh) -> bool:

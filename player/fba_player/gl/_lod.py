@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -15,12 +14,10 @@ import numpy.typing as npt
 
 from fba.arrays import Float32, Float64, Int32, Intp
 from fba.compiled import compiled
-from fba.mesh.simplify import TOLERANCES, DetailLevels
+from fba.mesh.simplify import TOLERANCES
 from fba_player._figure.detail import choose_level, level_triangles, sampled
 from fba_player.view._view import FaceMesh, FaceShape
 
-MAX_SHADOW_ERROR = TOLERANCES[-2]
-"""Largest error (m) of what casts the shadow of one body among several."""
 MORPH_SECONDS = 0.5
 """Seconds in which the vertices of a face move from one level of detail to another."""
 FULL = ("full", "0")
@@ -133,9 +130,8 @@ class Details:
         if before is None or not share_memory(before[0], mesh.light):
             before = mesh.light, _mean(mesh.light, level.rows, level.weights)
             self._lights[level.shape] = before
-        normals = _mean(mesh.normals, level.rows, level.weights)
-        positions = _mean(mesh.positions, level.rows, level.weights)
-        positions += level.heights[:, None] * normals
+        positions, normals = (np.zeros((len(level.rows), 3), dtype=np.float32) for _ in range(2))
+        _place(mesh.positions, mesh.normals, level.rows, level.weights, level.heights, positions, normals)
         return mesh._replace(
             shape=level.shape, positions=positions, normals=normals, light=before[1], away=away
         )
@@ -172,18 +168,15 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
         for array in (shape.texcoords, shape.wrinkle_places, shape.across)
     )
     outer = None if shape.coarser is None else shape.coarser.triangles_within(TOLERANCES[-1])
-    outermost = None
     if outer is not None:
         number = np.full(len(shape.sway), -1, dtype=np.int32)
         number[rows] = np.arange(len(rows))
         outer = number[outer]
         outer = np.ascontiguousarray(outer) if outer.min(initial=0) >= 0 else None
-    if outer is not None and shape.coarser is not None:
-        outermost = partial(_close_and_simplify, shape.coarser.points[rows, :3], outer)
     coarser = replace(
         shape,
         outer=outer,
-        outermost=outermost,
+        points=None if shape.coarser is None else shape.coarser.points[rows, :3],
         triangles=np.ascontiguousarray(corners.reshape(-1, 3), dtype=np.int32),
         colours=np.ascontiguousarray(shape.colours[rows]),
         sway=np.ascontiguousarray(shape.sway[rows]),
@@ -193,15 +186,6 @@ def _make_level(shape: FaceShape, triangles: Int32) -> _Level:
         coarser=None,
     )
     return _Level(coarser, rows.astype(np.intp))
-
-
-def _close_and_simplify(points: Float32, triangles: Int32) -> Int32:
-    """Return int32 (F, 3): fewer triangles, in which seams are closed; else all their vertices would stay."""
-    rows, corners = np.unique(triangles, return_inverse=True)
-    places, first, same = np.unique(points[rows], axis=0, return_index=True, return_inverse=True)
-    closed = same.ravel()[corners].reshape(-1, 3).astype(np.int32)
-    fewer = DetailLevels(places, 1, closed).triangles_within(MAX_SHADOW_ERROR)
-    return np.asarray(rows[first][closed if fewer is None else fewer], dtype=np.int32)
 
 
 def _faces(meshes: list[FaceMesh]) -> list[list[int]]:
@@ -225,6 +209,24 @@ def _mean(values: Float32, rows: Int32, weights: Float32) -> Float32:
     means = np.zeros((len(rows), values.shape[1]), dtype=np.float32)
     _add_means(values, rows, weights, means)
     return means
+
+
+@compiled
+def _place(
+    positions: Float32,
+    normals: Float32,
+    rows: Int32,
+    weights: Float32,
+    heights: Float32,
+    placed: Float32,
+    turned: Float32,
+) -> None:
+    """Add to (M, 3) positions and normals, 0 before, those of a level; see `CoarseShape`."""
+    _add_means(normals, rows, weights, turned)
+    _add_means(positions, rows, weights, placed)
+    for i in range(len(rows)):
+        for column in range(3):
+            placed[i, column] += heights[i] * turned[i, column]
 
 
 @compiled

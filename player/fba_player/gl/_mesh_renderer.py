@@ -58,11 +58,9 @@ class FaceRenderer:
     def begin(self, eye: Float64, matrix: Float64, pixel: float, shade: Shade | None = None) -> None:
         """Set the camera: its position (3,), the matrix (4, 4) to clip space, a pixel's size; and shadows."""
         self._shade = shade
-        before = self._camera
         self._camera = (np.asarray(eye, dtype=np.float64), matrix_bytes(matrix), pixel)
-        if self._camera[1:] != before[1:] or not np.array_equal(self._camera[0], before[0]):
-            for program in self._programs.values():
-                self._set_camera(program)
+        for program in self._programs.values():
+            self._set_camera(program)
         if shade is not None:
             shade.tops.use(3)
 
@@ -112,6 +110,7 @@ class FaceRenderer:
             program = self._programs[options] = load_program(self._gl, "face", *options)
             for unit, name in enumerate(("picture", "relief", "wrinkle_map", "tops")):
                 set_uniform(program, name, unit)
+            set_uniform(program, "clearance", CLEAR if "LIMBS" in options else CLEAR_OF_FACES)
             self._set_camera(program)
         return self._programs[options]
 
@@ -141,6 +140,8 @@ class FaceRenderer:
         if matrix:
             set_uniform(program, "camera", matrix)
         set_uniform(program, "pixel", pixel)
+        if self._shade is not None:
+            set_uniform(program, "frame", self._shade.frame)
 
     def _draw(self, mesh: FaceMesh, *, core: bool = False) -> None:
         """Draw a part. core: of a blended one, pixels that hide at least `CORE_OPACITY` of what is behind."""
@@ -183,9 +184,6 @@ class FaceRenderer:
         _set_pose(program, mesh)
         if "CUT" in options:
             set_uniform(program, "cut", CORE_OPACITY if core else shape.cutoff)
-        if self._shade is not None:
-            set_uniform(program, "frame", self._shade.frame)
-            set_uniform(program, "clearance", CLEAR_OF_FACES if mesh.limbs is None else CLEAR)
         if picture is not None:
             picture.use(0)
         if repeats is not None:

@@ -7,7 +7,6 @@ shells, grid, legend) have colours as displayed instead of colours under light.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -75,10 +74,11 @@ class FaceShape:
     whether the inside is never visible and not drawn. name, kind: of the model's part, "" if none begins.
     coarser: levels of detail of a body's part, None without any; levels: those of a face's, from fine to
     coarse. casts: whether it casts a shadow on the ground. outer: int32 (F, 3), fewer triangles that cast the
-    same shadow; None for all. outermost: finds still fewer, for the shadow of one of several bodies; None for
-    `outer`. smooth: False if triangles are so large that light changes visibly within them. wrinkle_places:
-    float32 (V, 2), where each vertex lies in `fba_player._mesh.wrinkle_map`, None for a part without
-    wrinkles. alpha, opacity, cutoff: as of `fba.mesh._meshes.Material`.
+    same shadow; None for all. points: float32 (V, 3), the vertices as modelled, by which `outer` is
+    simplified further for the shadow of one of several bodies; None to leave it as it is. smooth: False if
+    triangles are so large that light changes visibly within them. wrinkle_places: float32 (V, 2), where each
+    vertex lies in `fba_player._mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity, cutoff:
+    as of `fba.mesh._meshes.Material`.
     """
 
     triangles: Int32
@@ -97,7 +97,7 @@ class FaceShape:
     levels: tuple[CoarseShape, ...] = ()
     casts: bool = False
     outer: Int32 | None = None
-    outermost: Callable[[], Int32] | None = None
+    points: Float32 | None = None
     smooth: bool = True
     wrinkle_places: Float32 | None = None
     alpha: Alpha = "auto"

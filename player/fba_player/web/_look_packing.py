@@ -15,7 +15,7 @@ import numpy as np
 from fba.arrays import Float64, Int64
 from fba_player._figure.face import FaceFigure
 from fba_player._figure.face_light import LIGHTS
-from fba_player._figure.occlusion import SOFTNESS, harmonics
+from fba_player._figure.occlusion import FACTORS, harmonics
 from fba_player._figure.wrinkles import OUTSIDE_OF_MAP, wrinkle_table
 from fba_player._mesh.textures import RELIEF, skin_relief
 from fba_player._mesh.wrinkle_map import BOTTOM, TOP, WIDTH, wrinkle_map
@@ -54,13 +54,11 @@ def pack_face_light(container: Container, figure: FaceFigure, rows: Int64) -> di
         shut, wide = (
             getattr(visibility, name)[rows].astype(np.float64) for visibility in (baked.shut, baked.wide)
         )
-        weights = np.concatenate([harmonics(towards[lamp]) for lamp in lamps]) * np.repeat(
-            SOFTNESS, [1, 3, 5, 7]
-        )
+        weights = np.concatenate([harmonics(towards[lamp]) for lamp in lamps]) * FACTORS
         root = np.linalg.cholesky(weights.T @ weights / len(weights) + 1e-9 * np.eye(weights.shape[1]))
         axes = np.linalg.svd(np.concatenate([shut, wide[places]]) @ root, full_matrices=False)[2][:count]
         tables.append([table @ root @ axes.T for table in (shut, wide)])
-        basis.append(axes @ np.linalg.inv(root) * np.repeat(SOFTNESS, [1, 3, 5, 7]))
+        basis.append(axes @ np.linalg.inv(root) * FACTORS)
     tables.append([visibility.open[rows, None] for visibility in (baked.shut, baked.wide)])
     shut, wide = (np.concatenate(columns, axis=1) for columns in zip(*tables, strict=True))
     steps = np.rint(shut / LIGHT_STEP) * LIGHT_STEP
