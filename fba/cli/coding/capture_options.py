@@ -45,7 +45,7 @@ class CaptureOptions:
     )
     up: SignedUpAxis = option(default="auto", help="Motion capture: the axis that points up.")
     scale: float | None = option(
-        type=click.FloatRange(1e-6, 1e6),
+        type=options.FloatRange(1e-6, 1e6),
         metavar="METRES",
         help="Motion capture: metres of the person shown in one unit of the file, in place of what its legs "
         "say.",
