@@ -29,7 +29,9 @@ class _Goal:
 
     faces: int | None = option(type=click.IntRange(min=1), metavar="N", help="Triangles to keep.")
     ratio: float | None = option(
-        type=options.FloatRange(0, 1, min_open=True), metavar="R", help="Share of the triangles to keep, 0..1."
+        type=options.FloatRange(0, 1, min_open=True),
+        metavar="R",
+        help="Share of the triangles to keep, 0..1.",
     )
     error: float | None = option(
         type=LENGTH,
