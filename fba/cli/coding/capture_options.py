@@ -6,8 +6,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import click
-
 from fba.choices import Gaze, Ground, Origin, SignedUpAxis, Spine, Swap
 from fba.cli import map_options, options
 from fba.cli.inputs import Reading, check_capture_options

@@ -132,8 +132,8 @@ def _count_errors(face: FaceModel) -> int:
 def _warn_of_more(wanted: int, left: int) -> None:
     if left > wanted:
         warn(
-            f"asked for {wanted} triangles, but no edge is left that may collapse; edges of three triangles or "
-            "more, and feature points, stay",
+            f"asked for {wanted} triangles, but no edge is left that may collapse; edges of three triangles "
+            "or more, and feature points, stay",
             stacklevel=2,
         )
 
