@@ -63,12 +63,12 @@ class Receiving:
     """How a stream is received."""
 
     delay: float = option(
-        default=100.0, type=click.FloatRange(0, 10_000), metavar="MS",
+        default=100.0, type=options.FloatRange(0, 10_000), metavar="MS",
         help="Of a stream from a network: milliseconds that a packet waits for one before it, which may come "
         "later. In order, none waits.",
     )  # fmt: skip
     wait: float | None = option(
-        type=click.FloatRange(0, min_open=True), metavar="SECONDS",
+        type=options.FloatRange(0, min_open=True), metavar="SECONDS",
         help="Of a stream from a network: give up if it has not begun by then. Default: wait for it.",
     )  # fmt: skip
 

@@ -87,6 +87,15 @@ class TextType(click.ParamType[Any]):
             self.fail(str(error), param, ctx)
 
 
+class FloatRange(click.FloatRange):
+    """A number in a range, which NaN is in none of, though it is not beyond a limit."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if math.isnan(number := super().convert(value, param, ctx)):
+            self.fail(f"{value!r} is not a number", param, ctx)
+        return number
+
+
 def parse_number(text: str) -> float:
     """Return a finite number; NaN for other text."""
     try:

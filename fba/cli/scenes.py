@@ -97,7 +97,7 @@ class SceneOptions(Reading):
         help="What the camera follows. Default: the head in views of the face, else a figure that walks away."
     )
     orbit: float | None = option(
-        type=click.FloatRange(1.0, 3600.0),
+        type=options.FloatRange(1.0, 3600.0),
         metavar="SECONDS",
         help="Let the camera turn around the figure, once in this time.",
     )

@@ -5,6 +5,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -275,6 +276,16 @@ def test_simplify_writes_a_smaller_face_and_tells_how_good_it_is(run: Run, tmp_p
     assert "exists" in err
 
 
+def test_simplify_tells_of_a_goal_that_is_out_of_reach(run: Run, tmp_path: Path) -> None:
+    head = small_head()
+    skin = head.parts[0]
+    doubled = replace(skin, triangles=np.concatenate([skin.triangles, skin.triangles]))
+    replace(head, parts=(doubled, *head.parts[1:])).save(tmp_path / "doubled.glb")
+    _, out, err = run("model", "simplify", tmp_path / "doubled.glb", "-o", tmp_path / "a.glb", "--faces", 500)
+    assert "asked for 500 triangles, but no edge is left that may collapse" in err
+    assert "3884 triangles and 66 errors before" in out
+
+
 def test_simplify_takes_a_body_too(run: Run, tmp_path: Path) -> None:
     target = tmp_path / "small.glb"
     out = run("model", "simplify", "--default", "--body", "-o", target, "--ratio", 0.25, "--json").out
@@ -306,6 +317,7 @@ def test_simplify_stores_levels_with_the_model(run: Run, tmp_path: Path) -> None
         (["--default", "--body", "--levels", 2], "--body goes with --faces or --ratio"),
         (["--default", "--ratio", 0], "0"),
         (["--default", "--faces", 0], "0"),
+        (["--default", "--ratio", "nan"], "'nan' is not a number"),
         (["--default", "--levels", 17], "17"),
         (["--default", "--faces", 3], "3 triangles are too few"),
     ],

@@ -141,6 +141,18 @@ def test_pinned_vertices_stay_where_they_are() -> None:
     np.testing.assert_allclose(level.carry(vertices)[level.parents[pinned]], vertices[pinned], atol=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_pinned_vertices_of_a_torn_mesh_keep_a_triangle(seed: int) -> None:
+    """Where triangles touch in a corner only, one goes with an edge of it."""
+    random = np.random.default_rng(seed)
+    vertices, triangles = patch(15, 0.2)
+    torn = triangles[random.random(len(triangles)) < 0.6]
+    pinned = np.isin(np.arange(len(vertices)), torn) & (random.random(len(vertices)) < 0.3)
+    level = simplify(vertices[None], torn, 1, importance=np.where(pinned, np.inf, 1)).level(1)
+    assert not level.gone[pinned].any()
+    np.testing.assert_array_equal(level.positions[level.parents[pinned]], vertices[pinned])
+
+
 def shortest_way(vertices: Float64, triangles: Int32, start: int, end: int) -> Int32:
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra

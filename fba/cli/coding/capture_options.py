@@ -6,8 +6,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import click
-
 from fba.choices import Gaze, Ground, Origin, SignedUpAxis, Spine, Swap
 from fba.cli import map_options, options
 from fba.cli.inputs import Reading, check_capture_options
@@ -45,7 +43,7 @@ class CaptureOptions:
     )
     up: SignedUpAxis = option(default="auto", help="Motion capture: the axis that points up.")
     scale: float | None = option(
-        type=click.FloatRange(1e-6, 1e6),
+        type=options.FloatRange(1e-6, 1e6),
         metavar="METRES",
         help="Motion capture: metres of the person shown in one unit of the file, in place of what its legs "
         "say.",

@@ -38,7 +38,7 @@ class _Programs:
         "{fap_quant}, {bap_quant} and {bap_steps}.",
     )
     timeout: float = option(
-        type=click.FloatRange(min=0, min_open=True),
+        type=options.FloatRange(min=0, min_open=True),
         default=20.0,
         metavar="SECONDS",
         help="How long a program may take for a vector.",

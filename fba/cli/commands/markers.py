@@ -46,7 +46,7 @@ class _Tuning:
         "the mapping says, none in a new one."
     )
     squint: float | None = option(
-        type=click.FloatRange(0, 100),
+        type=options.FloatRange(0, 100),
         metavar="PERCENT",
         help="Narrow the eyes by this share of their opening. Default: as the mapping says, 0 in a new one.",
     )

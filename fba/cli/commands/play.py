@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class _Window:
     """Options of the window, which dropped files keep."""
 
-    speed: float = option(type=click.FloatRange(0.1, 4.0), default=1.0, help="1: as recorded.")
+    speed: float = option(type=options.FloatRange(0.1, 4.0), default=1.0, help="1: as recorded.")
     loop: bool = option(default=False, help="Start again at the end.")
     interpolate: bool = option(default=True, help="Smooth motion between frames, or frame by frame.")
     size: tuple[int, int] = options.size_option(default=(1280, 720), typed="1280x720", show_default=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from fba.animation import Animation
     from fba.speech import Prosody, Speech
 
-SHARE = click.FloatRange(0, 1)
+SHARE = options.FloatRange(0, 1)
 MOST_TEXT_BYTES = 1 << 24
 WELL_HEARD = 0.8
 """Nothing is said of missing words where at least this share of a text's words is heard."""

@@ -145,7 +145,11 @@ def _places(target: _Target, given: _Given, photographs: list[Photograph]) -> tu
         if view not in places:
             try:
                 found = finders[view](photograph)
-            except ModelError:
+            except ModelError as error:
+                if target.edit is None and view == "front" and len(photographs) > 1:
+                    raise ModelError(
+                        f"{error}, or give the photographs as FRONT SIDE if this is the profile"
+                    ) from None
                 if target.edit is None:
                     raise
                 places[view] = fitting.template_points(photograph, view)  # to be dragged

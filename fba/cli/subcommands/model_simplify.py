@@ -15,6 +15,7 @@ from fba.cli.inputs import read_body, read_model
 from fba.cli.option_fields import option, with_options
 from fba.cli.outputs import Output, Outputs, check_glb, display_name, output_option
 from fba.cli.printing import Progress
+from fba.errors import warn
 
 if TYPE_CHECKING:
     from fba.face import FaceModel
@@ -28,7 +29,9 @@ class _Goal:
 
     faces: int | None = option(type=click.IntRange(min=1), metavar="N", help="Triangles to keep.")
     ratio: float | None = option(
-        type=click.FloatRange(0, 1, min_open=True), metavar="R", help="Share of the triangles to keep, 0..1."
+        type=options.FloatRange(0, 1, min_open=True),
+        metavar="R",
+        help="Share of the triangles to keep, 0..1.",
     )
     error: float | None = option(
         type=LENGTH,
@@ -93,25 +96,45 @@ def command(
     if body:
         _simplify_body(head, goal, output, outputs, as_json=as_json)
         return
-    from fba.face import FaceModel, checks
+    from fba.face import FaceModel
 
     model = read_model(head) or FaceModel.default()
     with Progress("simplifying", None):
         result, rows = _simplified(model, goal)
     with Progress("checking", None):
+        before = _count_errors(model)
         for row, face in zip(rows, [level.model for level in result.levels] or [result], strict=True):
-            findings = [*checks.check_neutral(face), *checks.check_faps(face)]
-            row["findings"] = sum(finding.severity == "error" for finding in findings)
+            row["findings"] = _count_errors(face)
     with outputs.file(output) as file:
         result.save(file)
     if as_json:
-        outputs.print_json({"output": str(output), "faces": len(model.triangles), "levels": rows})
+        report = {"output": str(output), "faces": len(model.triangles), "findings": before, "levels": rows}
+        outputs.print_json(report)
         return
-    outputs.say(f"{display_name(output)}: {model.name or 'a face'}, {len(model.triangles)} triangles before")
+    had = f" and {before} errors" if before else ""
+    outputs.say(
+        f"{display_name(output)}: {model.name or 'a face'}, {len(model.triangles)} triangles{had} before"
+    )
     for row in rows:
         outputs.say(
             f"  {row['faces']:6} triangles, {row['vertices']:6} vertices, within {row['error_mm']:.2f} mm; "
             f"{row['findings']} errors by fba model validate"
+        )
+
+
+def _count_errors(face: FaceModel) -> int:
+    from fba.face import checks
+
+    findings = [*checks.check_neutral(face), *checks.check_faps(face)]
+    return sum(finding.severity == "error" for finding in findings)
+
+
+def _warn_of_more(wanted: int, left: int) -> None:
+    if left > wanted:
+        warn(
+            f"asked for {wanted} triangles, but no edge is left that may collapse; edges of three triangles "
+            "or more, and feature points, stay",
+            stacklevel=2,
         )
 
 
@@ -120,8 +143,10 @@ def _simplify_body(path: Path | None, goal: _Goal, output: Path, outputs: Output
     from fba.body.simplification import simplify_body
 
     model = read_body(path) or BodyModel.default()
+    wanted = goal.faces or max(round(len(model.triangles) * (goal.ratio or 0.0)), 1)
     with Progress("simplifying", None):
-        made = simplify_body(model, goal.faces or max(round(len(model.triangles) * (goal.ratio or 0.0)), 1))
+        made = simplify_body(model, wanted)
+    _warn_of_more(wanted, len(made.triangles))
     with outputs.file(output) as file:
         made.save(file)
     before, left = len(model.triangles), len(made.triangles)
@@ -149,6 +174,8 @@ def _simplified(model: FaceModel, goal: _Goal) -> tuple[FaceModel, list[dict[str
     meshes = [
         mesh for n, mesh in enumerate(meshes) if not n or len(mesh.triangles) < len(meshes[n - 1].triangles)
     ]
+    if goal.error is None:
+        _warn_of_more(wanted[0], len(meshes[0].triangles))
     rows = [
         {"faces": len(mesh.triangles), "vertices": len(mesh.positions), "error_mm": 1000 * made.error(mesh)}
         for mesh in meshes

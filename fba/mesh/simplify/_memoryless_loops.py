@@ -483,6 +483,8 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
         t = c // 3
         if surface.triangles[t, 0] >= 0 and _corner_of(surface.triangles[t], b) >= 0:
             faces, one = faces + 1, t
+            if _loses_corner(surface, a, b, t):
+                return False
         c = surface.follow[c]
     if faces == 1 and both == 3:
         return _may_go(surface, one)
@@ -490,6 +492,17 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
     if _on_border(surface, a) and _on_border(surface, b) and faces != 1:
         return False
     return common == faces and 1 <= faces <= 2 and both > (3 if border else 4)
+
+
+@compiled
+def _loses_corner(surface: Surface, a: int, b: int, t: int) -> bool:
+    """Return whether the corner of a triangle beside its edge from a to b stays, and is in no other one."""
+    v, others = surface.triangles[t].sum() - a - b, 0
+    c = surface.first[v]
+    while c >= 0:
+        others += surface.triangles[c // 3, 0] >= 0 and c // 3 != t
+        c = surface.follow[c]
+    return bool(surface.kind[v] == PINNED and others == 0)
 
 
 @compiled

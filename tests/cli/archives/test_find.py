@@ -84,6 +84,7 @@ def test_the_best_are_drawn(run: Run, made: Path, tmp_path: Path) -> None:
         ("--build new.npz raising.fba --views 0", "0 is not in the range"),
         ("5.png index.npz --views 3", "--views goes with --build"),
         ("5.png index.npz --pitch 3", "--pitch goes with --build"),
+        ("--build new.npz raising.fba --pitch nan", "'nan' is not a number"),
         ("5.png index.npz --fps 3", "--fps goes with -o and an animation"),
         ("5.png index.npz -o x.png --fps 3", "--fps goes with -o and an animation"),
     ],

@@ -98,6 +98,8 @@ def test_points_that_are_not_found_are_dragged_from_a_template(
 def test_mistakes_are_told(run: Run, photo: Path) -> None:
     out_file = photo.with_name("a.glb")
     assert "no face was found" in run("model", "photos", photo, "-o", out_file, code=1).err
+    err = run("model", "photos", photo, photo, "-o", out_file, code=1).err
+    assert "give the photographs as FRONT SIDE if this is the profile" in err
     assert not out_file.exists()
     err = run("model", "photos", photo, "-o", out_file, "--edit", photo.with_name("p.csv"), code=2).err
     assert "name it .json" in err

@@ -49,7 +49,7 @@ class _Building:
     pitches: tuple[float, ...] = option(
         "--pitch",
         default=(),
-        type=click.FloatRange(-89, 89),
+        type=options.FloatRange(-89, 89),
         multiple=True,
         metavar="DEGREES",
         help="With --build: draw from this far above; repeatable. Default: 0.",

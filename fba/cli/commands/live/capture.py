@@ -140,7 +140,7 @@ class _Request:
         "Frame rate of the stream. Default: the sender's own, else 60; vmc: that of its first second."
     )
     neutral: float | None = option(
-        type=click.FloatRange(0, LONGEST_NEUTRAL, min_open=True),
+        type=options.FloatRange(0, LONGEST_NEUTRAL, min_open=True),
         metavar="SECONDS",
         help="The first seconds show the neutral face: their median is subtracted. vmc: the first moment is "
         "a T-pose. Default: all counts as it is sent.",
