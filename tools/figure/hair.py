@@ -53,8 +53,12 @@ RAGGED = (0.0012, 0.0024)
 """How far, metres, the painted hairline of straight and of curly hair wanders."""
 THINNING = 0.016
 """Metres above the hairline over which hair becomes full."""
-CROPPED = (((0.0, -0.048, -0.185), (0.075, 0.035, 0.075)), ((0.076, -0.016, -0.066), (0.020, 0.022, 0.016)))
-"""Places on the left, and how far around them, metres, where hair is cut ever shorter downwards: nape, sideburn."""
+CROPPED = (
+    # a place on the left, how far around it, metres; how much
+    ((0.0, -0.048, -0.185), (0.075, 0.035, 0.075), 2.4),
+    ((0.076, -0.016, -0.066), (0.020, 0.022, 0.016), 1.4),
+)
+"""Where hair is cropped ever shorter towards its edge: the nape and the sideburn."""
 STRANDS, SEGMENTS = 10, 6
 """Of each lock, and straight pieces of each strand."""
 WIDTH = 0.0006
@@ -140,7 +144,7 @@ def painted_height(positions: Float64, hair: Hair) -> Float64:
     """Return (N,) heights above the hairline as hair is painted: less where it is cropped, and irregular."""
     ragged = RAGGED[int(hair.curly)] * (noise(positions, 0.011, 71) + 0.7 * noise(positions, 0.004, 72))
     above = height_above_hairline(positions)
-    height = np.where(above > -0.5, (above + ragged) / (1 + 1.6 * _cropped(positions)), above)
+    height = np.where(above > -0.5, (above + ragged) / (1 + _cropped(positions)), above)
     if hair.curly:
         return height
     # Along the parting, which ends softly on the crown, there is scalp as well.
@@ -150,11 +154,10 @@ def painted_height(positions: Float64, hair: Hair) -> Float64:
 
 
 def _cropped(positions: Float64) -> Float64:
-    """Return (N,) how far hair is cropped at points (N, 3): 0 not, 1 most."""
+    """Return (N,) how far hair is cropped at points (N, 3): 0 where it is not."""
     folded = np.where(positions[:, :1] < 0, (-1.0, 1.0, 1.0), (1.0, 1.0, 1.0)) * positions
-    return np.sum(
-        [np.exp(-(((folded - place) / reach) ** 2).sum(axis=1)) for place, reach in CROPPED], axis=0
-    )
+    near = [much * np.exp(-(((folded - at) / reach) ** 2).sum(axis=1)) for at, reach, much in CROPPED]
+    return np.sum(near, axis=0)
 
 
 def scalp(positions: Float64, edge_width: float = 0.004) -> Float64:
@@ -253,7 +256,7 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
         order = tone = 0.7 * tone + 0.12 * noise(places, 0.007, 64)
     else:
         length = (0.005 + full * (0.011 + 0.022 * long)) * uniform(0.7, 1.2, count)
-        length *= 1 - 0.5 * _cropped(places)
+        length /= 1 + 0.5 * _cropped(places)
         width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
         heading, bend = normal(0, 0.1, count), normal(0, 0.16, count) + 0.35 * noise(places, 0.020, 62)
         tone += 0.3 * (1 - full)
