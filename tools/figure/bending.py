@@ -11,7 +11,7 @@ from fba.body import Skeleton
 from fba.sampling import smoothstep
 
 HINGES = (
-    ("?_shoulder", "?_elbow", "?_wrist", (0.0, 0.0, 1.0), 0.040, 0.046),
+    ("?_shoulder", "?_elbow", "?_wrist", (0.0, 0.0, 1.0), 0.040, 0.056),
     ("?_elbow", "?_wrist", "?_middle1", (0.0, 0.0, 1.0), 0.040, 0.040),
     ("?_hip", "?_knee", "?_ankle", (0.0, 0.0, -1.0), 0.060, 0.070),
 )

@@ -47,17 +47,27 @@ AXIS = -0.085
 """z of the vertical axis around which the angles of the hairline are measured."""
 
 
-LOCKS = (7000, 16000)
+LOCKS = (9000, 9000)
 """How many locks of straight and of curly hair are painted."""
+RAGGED = (0.0012, 0.0024)
+"""How far, metres, the painted hairline of straight and of curly hair wanders."""
+THINNING = 0.016
+"""Metres above the hairline over which hair becomes full."""
+CROPPED = (
+    # a place on the left, how far around it, metres; how much
+    ((0.0, -0.048, -0.185), (0.075, 0.035, 0.075), 2.4),
+    ((0.076, -0.016, -0.066), (0.020, 0.022, 0.016), 1.4),
+)
+"""Where hair is cropped ever shorter towards its edge: the nape and the sideburn."""
 STRANDS, SEGMENTS = 10, 6
 """Of each lock, and straight pieces of each strand."""
 WIDTH = 0.0006
 """Of a strand, metres."""
-PROFILES = np.array([[-0.32, -0.10, 0.0, 0.06, 0.12, 0.16], [-0.30, 0.05, 0.2, 0.2, 0.05, -0.30]])
+PROFILES = np.array([[-0.22, -0.08, 0.0, 0.06, 0.12, 0.16], [-0.42, 0.0, 0.25, 0.25, 0.0, -0.42]])
 """How much brighter a strand is from its root to its tip: of straight and of curly hair."""
 DARKEST, BRIGHTEST = -1.4, 1.4
 """Tones at the ends of what a picture holds."""
-DEEP = (-0.7, -0.35)
+DEEP = (-0.7, -0.62)
 """Tones between strands of straight and of curly hair."""
 REACH, SCALE, SOFT = 3.25, 900, 2.0
 """Extent of `strand_places` away from the parting; pixels to a unit of them; pixels of blur."""
@@ -101,7 +111,7 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
     # Locks end in a rounded edge, but hair of the nape grows thinner downwards.
     nape = smoothstep((-0.105 - folded[:, 2]) / 0.03) * smoothstep((0.02 - folded[:, 1]) / 0.03)
     share = np.clip(above / (hair.rise * (1 + nape)), 0.0, 1.0)
-    share = (share * (2 - share)) ** (0.6 + 0.4 * nape) * smoothstep(above / 0.004)
+    share = (share * (2 - share)) ** (0.6 + 0.4 * nape) * smoothstep((above - 0.002) / 0.010)
     return vertices + unit(vertices - MIDDLE) * (share * np.maximum(full, DEEPEST))[:, None]
 
 
@@ -128,6 +138,26 @@ def height_above_hairline(positions: Float64) -> Float64:
     ear = (np.abs(positions[:, 0]) > 0.0765) & (positions[:, 1] < 0.006)
     ear &= (positions[:, 2] > -0.122) & (positions[:, 2] < -0.100)
     return np.where(ear, -1.0, above)
+
+
+def painted_height(positions: Float64, hair: Hair) -> Float64:
+    """Return (N,) heights above the hairline as hair is painted: less where it is cropped, and irregular."""
+    ragged = RAGGED[int(hair.curly)] * (noise(positions, 0.011, 71) + 0.7 * noise(positions, 0.004, 72))
+    above = height_above_hairline(positions)
+    height = np.where(above > -0.5, (above + ragged) / (1 + _cropped(positions)), above)
+    if hair.curly:
+        return height
+    # Along the parting, which ends softly on the crown, there is scalp as well.
+    places = strand_places(positions)
+    away = np.maximum(places.real * _metres(places) + 0.0005 * noise(positions, 0.003, 67), 0.0)
+    return np.minimum(height, 0.002 + 10 * away + 0.010 * smoothstep((0.1 - np.cos(places.imag)) / 0.8))
+
+
+def _cropped(positions: Float64) -> Float64:
+    """Return (N,) how far hair is cropped at points (N, 3): 0 where it is not."""
+    folded = np.where(positions[:, :1] < 0, (-1.0, 1.0, 1.0), (1.0, 1.0, 1.0)) * positions
+    near = [much * np.exp(-(((folded - at) / reach) ** 2).sum(axis=1)) for at, reach, much in CROPPED]
+    return np.sum(near, axis=0)
 
 
 def scalp(positions: Float64, edge_width: float = 0.004) -> Float64:
@@ -175,23 +205,23 @@ def _map_axes() -> tuple[Float64, Float64, Float64, float]:
 
 def paint_locks(p: Float64, hair: Hair) -> tuple[Float64, Float64]:
     """Return (N,) how bright hair is at points (N, 3), about -1..1, and (N,) how much of them it covers."""
-    above, places = height_above_hairline(p), strand_places(p)
+    above, places = painted_height(p, hair), strand_places(p)
     picture = _draw_locks(_sow_locks(p, above, hair), hair)
     at = np.stack([places.real, places.imag + np.pi]) * SCALE
     drawn, cover = (map_coordinates(values, at, order=1) for values in picture)
     # Between strands one sees deep into full hair, but the skin where it is sparse.
-    gaps = (1 - cover) * smoothstep((above - 0.002) / 0.010)
+    gaps = (1 - cover) * smoothstep((above - 0.002) / THINNING)
     cover = cover + gaps
+    # Single hairs at the edge are finer than a texel.
+    thin = 0.55 + 0.45 * smoothstep(above / THINNING)
     tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
     if not hair.curly:
         # Light from above glances off the strands where they turn down.
         rise = unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69)
         shine = np.exp(-(((rise - 0.74) / 0.14) ** 2))
         tone = tone * (1 + 0.3 * shine) + 0.40 * shine
-        away = places.real * _metres(places) + 0.0011 * noise(p, 0.004, 67)
-        cover *= 1 - 0.27 * np.exp(-((np.maximum(away, 0) / 0.0013) ** 2))
     ears = (np.abs(p[:, 0]) > EARS[0]) & (p[:, 1] < EARS[1])
-    return tone, np.where(ears, 0.0, cover)
+    return tone, np.where(ears, 0.0, cover * thin)
 
 
 def _metres(places: Complex128) -> Float64:
@@ -212,20 +242,21 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
     p, above = p[::SPARSER], above[::SPARSER]
     apart, nearest = cKDTree(unit(p - MIDDLE)).query(strand_points(roots))
     height = above[nearest]
-    kept = (apart < 0.01) & (random.uniform(0, 1, len(roots)) < smoothstep((height + 0.004) / 0.009))
+    kept = (apart < 0.01) & (random.uniform(0, 1, len(roots)) < smoothstep((height + 0.003) / 0.012))
     roots, height, places = roots[kept][:most], height[kept][:most], p[nearest[kept][:most]]
     count = len(roots)
     long = smoothstep((unit(places - MIDDLE)[:, 1] - 0.1) / 0.7)
-    full = smoothstep(height / 0.020)
+    full = smoothstep(height / THINNING)
     normal, uniform = random.normal, random.uniform
     tone = normal(0, 0.20, count) + 0.2 * noise(places, 0.016, 63)
     if hair.curly:
-        length, width = uniform(0.005, 0.009, count), uniform(0.0009, 0.0020, count)
+        length, width = uniform(0.013, 0.023, count) * (0.4 + 0.6 * full), uniform(0.0019, 0.0033, count)
         heading = uniform(-np.pi, np.pi, count)
-        bend = uniform(2.5, 5.5, count) * random.choice((-1, 1), count)
-        order = tone = 0.7 * tone + 0.12 * noise(places, 0.0042, 64)
+        bend = uniform(3.5, 6.5, count) * random.choice((-1, 1), count)
+        order = tone = 0.7 * tone + 0.12 * noise(places, 0.007, 64)
     else:
         length = (0.005 + full * (0.011 + 0.022 * long)) * uniform(0.7, 1.2, count)
+        length /= 1 + 0.5 * _cropped(places)
         width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
         heading, bend = normal(0, 0.1, count), normal(0, 0.16, count) + 0.35 * noise(places, 0.020, 62)
         tone += 0.3 * (1 - full)
@@ -251,7 +282,7 @@ def _draw_locks(locks: Locks, hair: Hair) -> tuple[Float64, Float64]:
     for share in np.linspace(0, 1, SEGMENTS + 1):
         metres, heading = _metres(at), np.exp(1j * (locks.headings + locks.bends * share))[each]
         path.append(at + side * (1 - 0.7 * full * share**1.5) * heading / metres)
-        widths.append(WIDTH * (0.55 + 0.45 * full) * (1.05 - share) ** 0.5 / metres)
+        widths.append(WIDTH * (0.35 + 0.65 * full) * (1.05 - share) ** 0.5 / metres)
         at = at + length / SEGMENTS / metres * heading
     size = int(2 * np.pi * SCALE) + 2, int(REACH * SCALE) + 2
     picture = Image.new("L", size)

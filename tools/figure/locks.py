@@ -15,7 +15,7 @@ GLOSS = 0.1
 GROUPS = (
     # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
     ("front", 70, (0.005, 0.030), (0.016, 0.028), 0.00070, 0.0030),
-    ("crown", 90, (0.012, 1.0), (0.014, 0.026), 0.00070, 0.0032),
+    ("crown", 90, (0.026, 1.0), (0.014, 0.026), 0.00070, 0.0032),
 )
 NEIGHBOURS = 8
 """Vertices between which the depth of the layer is interpolated."""

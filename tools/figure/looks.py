@@ -72,7 +72,7 @@ ALEX = Looks(
     ),
     skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
     waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(191, 114, 103), lip_line=(146, 78, 71),
-    freckle=(178, 118, 92), scalp=(112, 86, 73), brow=(60, 44, 34),
+    freckle=(178, 118, 92), scalp=(96, 72, 60), brow=(60, 44, 34),
 )  # fmt: skip
 """The built-in person: a young man with brown hair."""
 RUTH = Looks(

@@ -6,7 +6,7 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
-from hair import TONES, height_above_hairline, noise, paint_locks
+from hair import TONES, noise, paint_locks, painted_height
 from looks import ALEX, Looks
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.interpolate import PchipInterpolator
@@ -113,13 +113,13 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
 
 def _hair(colour: Float64, p: Float64, looks: Looks) -> Float64:
     """Return the colour with the hair of the head: strands that thin out towards their tips."""
-    above = height_above_hairline(p)
+    above = painted_height(p, looks.hair)
     near = above > -0.02
     p, above, hair = p[near], above[near], looks.hair
     tone, cover = paint_locks(p, hair)
     strands = np.stack([np.interp(tone, TONES, [c[k] for c in hair.colours]) for k in range(3)], axis=1)
     # Through sparse hair skin is seen, in the shade.
-    below = _blend(colour[near], np.array(looks.scalp), smoothstep((above + 0.006) / 0.012) * 0.55)
+    below = _blend(colour[near], np.array(looks.scalp), smoothstep((above + 0.006) / 0.020) * 0.85)
     colour[near] = _blend(below, strands, cover)
     return colour
 

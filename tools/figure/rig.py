@@ -35,14 +35,15 @@ NECK = ("Neck1", "Neck2")
 ARM = ("shoulder", "elbow", "wrist", "thumb", *FINGERS)
 HEAD = ("Head", "HeadEnd", "Jaw", "LeftEye", "RightEye")
 
-CAP = (-0.11, 0.05)
+CAP = (-0.13, 0.035)
 """Heights from the joint over which moving in the cap fades in, metres."""
-LEFT = 0.75
+LEFT = 0.67
 """Share that remains of its distance beyond SIDE, at the upper of these heights."""
 SIDE = -0.010
 """Metres out from the joint from which that distance is measured."""
-DROP, DROPPED = 0.020, (0.02, 0.055)
-"""Metres by which the end of the shoulder is lowered, how far within the joint, and over which distance."""
+DROP, DROPPED = 0.018, (0.02, 0.055)
+"""Metres by which the end of the shoulder is lowered, from how far within the joint outwards, and over which
+distance that begins."""
 COLLAR = 0.085
 """Metres from the midline within which it stays: the neck, which a head brings, goes under a collar there."""
 STRAIGHT = (0.13, 0.80)
@@ -175,7 +176,7 @@ def shape_for_standing(person: Person, bones: Rig) -> Person:
         out = sign * (positions[:, 0] - joint[0])
         high = smoothstep((positions[:, 1] - joint[1] - CAP[0]) / (CAP[1] - CAP[0]))
         shift[:, 0] -= sign * np.maximum(out - SIDE, 0.0) * (1 - LEFT) * high
-        end = np.exp(-(((out + DROPPED[0]) / DROPPED[1]) ** 2))
+        end = np.exp(-((np.minimum(out + DROPPED[0], 0.0) / DROPPED[1]) ** 2))
         end *= smoothstep((np.abs(positions[:, 0]) - COLLAR) / 0.05)
         shift[:, 1] -= DROP * end * smoothstep((positions[:, 1] - joint[1] + 0.01) / 0.06)
         knee = bones.centres[bones.names.index(f"{side}_knee")]

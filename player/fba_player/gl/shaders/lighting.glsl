@@ -98,7 +98,7 @@ float mirrored_around(vec3 view, vec3 n, float gloss, vec4 reach) {
 // Shares of the key light's reflections and of those around that are left on dark surfaces, such as hair: light
 // is lost among its strands, most of all where it grazes them.
 vec2 unlost(vec3 albedo) {
-    return mix(vec2(0.35, 0.15), vec2(1.0), smoothstep(0.02, 0.16, max(albedo.r, max(albedo.g, albedo.b))));
+    return mix(vec2(0.35, 0.15), vec2(1.0), smoothstep(0.02, 0.24, max(albedo.r, max(albedo.g, albedo.b))));
 }
 
 // Diffuse light from a surface in the studio, without its colour. n: normal; reach: shares of light that reach
