@@ -247,10 +247,17 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     # The lower lid ends in a fold.
     fold = np.where(near, np.exp(-(((ring - 7.0) / 1.3) ** 2)) * 0.35, 0.0) * smoothstep((-4 - y) / 5)
     colour = _blend(colour, np.array(looks.socket), fold * (1 - smoothstep((x - 34) / 8)))
+    # The upper lid is thin and a little darker; it ends in a crease.
+    upper = near & (y > -3)
+    thin = np.where(upper, smoothstep((ring - 3.6) / 1.2) * (1 - smoothstep((ring - 6.4) / 1.6)), 0.0)
+    crease = np.where(upper, np.exp(-(((ring - 7.7) / 0.55) ** 2)), 0.0)
+    crease *= smoothstep((x - 21.0) / 5.0) * (1 - smoothstep((x - 39.0) / 5.0))
+    colour = _blend(colour, np.array(looks.socket), 0.30 * thin)
+    colour = _blend(colour, np.array(looks.socket) * 0.80, 0.42 * crease)
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.55, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.20, line)
-    line *= smoothstep((x - 19.0) / 5.0) * (1 - 0.85 * smoothstep((x - 37.5) / 4.0))
+    line *= smoothstep((x - 22.5) / 5.0) * (1 - 0.85 * smoothstep((x - 37.5) / 4.0))
     colour = _blend(colour, np.array(ALEX.brow), line)
     caruncle = near & (ring < 1.6) & (x < 24)
     return np.where(caruncle[:, None], np.array(looks.caruncle) + noise(p, 0.001, 9)[:, None] * 10, colour)

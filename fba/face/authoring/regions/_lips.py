@@ -5,7 +5,7 @@ around them. The corners of a lip that opens are arcs, not the ends of a straigh
 together, as they mostly are, they move the lip as a whole.
 
 A smile also slides corners that are drawn apart back round the teeth. Lips do not grow thin: their contours
-have FAPs of their own, and captures would find those moved. Corners that are raised push the cheek up into a
+have FAPs of their own, and captures would find those moved. But between these, lips that open or stretch grow flatter. Corners that are raised push the cheek up into a
 bulge below the eye, beside which the fold from nose to mouth deepens.
 """
 
@@ -42,9 +42,9 @@ BEND = 0.62
 """From there on, its way back as a share of its way to the side."""
 BULGE = (0.62, 0.40)
 """How far the cheek comes out, and up, as shares of the way of a raised corner."""
-FOLD = -0.20
+FOLD = -0.27
 """The same of the fold beside it."""
-CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.13)
+CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.12)
 """Where they are: shares of feature points of the left side, and their breadth in ES0."""
 RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
 SMILE_NEAR, SMILE_REACH = 0.54, 0.78
@@ -89,6 +89,10 @@ ARC = (2.2, 0.0)
 """How steep the arc begins on the inner and the outer contour, as shares of the motion of the handle."""
 ARC_VALUE = 300.0
 """Value up to which the arc grows."""
+FLATTENS = dict.fromkeys((4, 5, 8, 9, 10, 11, 51, 52, 55, 56, 57, 58), -1.0) | dict.fromkeys(STRETCHING, 1.0)
+"""FAPs that make the red of the lips flatter, and the sign of the values that do."""
+FLATTER, FLAT_VALUE = 0.07, 400.0
+"""By how much, as a share of the way of the handle, and the value up to which that grows."""
 REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.3
@@ -140,9 +144,9 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             inner, outer = field * inward, field * (1 - inward)
             pair = coupled_motions(limiter, (inner, inner), (outer, outer), number)
             motions[number], motions[mate] = pair
-    for number in ARCS.keys() & motions.keys():
-        curved = _with_arc(motions[number], lips, number, marks.step(number))
-        motions[number] = stop_at_folds(limiter, unfold(surface, limiter, curved, pinned, False))
+    for number in FLATTENS.keys() & motions.keys():
+        shaped = _with_shape(marks, lips, number, motions[number])
+        motions[number] = stop_at_folds(limiter, unfold(surface, limiter, shaped, pinned, False))
     return {fap: add_smile(marks, limiter, fap, motion) for fap, motion in motions.items()}, lost
 
 
@@ -296,14 +300,25 @@ def smooth_weights(x: Float64, count: int) -> Float64:
     return weights
 
 
-def _with_arc(motion: Motion, lips: _Lips, fap: int, step: Float64) -> Motion:
-    """Return the motion of the handle beside a corner with the arc between them. step: (3,), of the FAP."""
-    share = lips.inward if fap < 50 else 1 - lips.inward
-    arc = lips.arc[ARCS[fap]] * share
-    motion = _including(motion, np.flatnonzero(arc))
-    values = np.union1d(motion.values, np.clip((-ARC_VALUE, ARC_VALUE), motion.values[0], motion.values[-1]))
-    ways = np.clip(values, -ARC_VALUE, ARC_VALUE)[:, None, None] * step
-    shifts = np.stack([motion.shifts_at(value) for value in values]) + ways * arc[motion.vertices, None]
+def _with_shape(marks: Landmarks, lips: _Lips, fap: int, motion: Motion) -> Motion:
+    """Return the motion with the arc beside a corner of the mouth, and with lips that grow flatter."""
+    inner = fap < 50
+    if fap in ARCS:
+        arc = lips.arc[ARCS[fap]] * (lips.inward if inner else 1 - lips.inward)
+        motion = _adding(motion, arc[:, None] * marks.step(fap), (-ARC_VALUE, ARC_VALUE))
+    between = 4 * lips.inward * (1 - lips.inward) * np.clip(_fap_field(lips, fap), 0.0, 1.0)
+    size = float(np.linalg.norm(marks.step(fap))) * FLATTENS[fap] * FLATTER / 2
+    flatter = trim_small(between)[:, None] * -size * marks.surface.normals
+    low, high = sorted((0.0, FLATTENS[fap] * FLAT_VALUE))
+    return _adding(motion, flatter, (low, high))
+
+
+def _adding(motion: Motion, field: Float64, ends: tuple[float, float]) -> Motion:
+    """Return the motion with value x field (N, 3) of the surface added, for values between two ends."""
+    motion = _including(motion, np.flatnonzero(field.any(axis=1)))
+    values = np.union1d(motion.values, np.clip(ends, motion.values[0], motion.values[-1]))
+    ways = np.clip(values, *ends)[:, None, None]
+    shifts = np.stack([motion.shifts_at(value) for value in values]) + ways * field[motion.vertices]
     return Motion(values, motion.vertices, shifts)
 
 
