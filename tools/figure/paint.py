@@ -284,6 +284,8 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Loo
     colour = _blend(colour, lip, red * 0.88)
     seam = np.where(near, smoothstep((2.1 - ring) / 1.2), 0.0) * (1 - 0.6 * corner)
     colour = _blend(colour, np.array(looks.lip_line), seam * 0.45)
+    # The corners lie in the shade of the cheeks.
+    colour = _blend(colour, np.array(looks.lip_line), 0.42 * _spot(p, (26.2, -69.6, 4.6), 4.6) ** 1.5)
     inside = np.where(near, smoothstep((0.6 - ring) / 1.2), 0.0)
     colour = _blend(colour, MOUTH, inside)
     # A light edge above the upper lip.
