@@ -33,8 +33,8 @@ SINKING = np.array([0.0, 0.0, 0.3, 1.5, 3.4, 6.2, 8.8]) / 1000
 SUNK_GUM = 0.4
 """Share of that by which their gum is deeper: so low a crown is short, too."""
 RISING = np.array([0.0, 0.55, 0.1, 0.5, 0.9, 1.3, 1.8]) / 1000
-"""Metres by which the edge of each upper tooth is higher than that of the first: a line that bends as the lower
-lip does, with lateral incisors above it."""
+"""Metres by which the edge of each upper tooth is higher than that of the first: a line that bends as the
+lower lip does, with lateral incisors above it."""
 CORNERS = (0.45, 1.0)
 """Millimetres by which an edge is rounded off at its corners, towards the midline and away from it."""
 TURNS = np.radians([0, 30, 60, 90, 120, 150, 180, 225, 270, 315])

@@ -2,7 +2,8 @@
 
 Every vertex of a lid stays in its own upright plane and turns about the eyeball. A lid closes column by
 column, each in proportion to its own opening, so that the margins meet along their whole length however the
-way is split between upper and lower lid. The skin above the upper lid comes out of its fold and down to the eyeball.
+way is split between upper and lower lid. The skin above the upper lid comes out of its fold and down to the
+eyeball.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
 """The lips: FAPs 4-13, 16, 17 (inner contour) and 51-60 (outer contour).
 
 Eight handles, each a pair of an inner and an outer point, spread smoothly along the lips and into the skin
-around them. The corners of a lip that opens are arcs, not the ends of a straight line. The inner FAP moves what lies towards the inner contour, the outer FAP the rest; sent
-together, as they mostly are, they move the lip as a whole.
+around them. The corners of a lip that opens are arcs, not the ends of a straight line. The inner FAP moves
+what lies towards the inner contour, the outer FAP the rest; sent together, as they mostly are, they move the
+lip as a whole.
 
 A smile also slides corners that are drawn apart back round the teeth. Lips do not grow thin: their contours
-have FAPs of their own, and captures would find those moved. But between these, lips that open or stretch grow flatter. Corners that are raised push the cheek up into a
+have FAPs of their own, and captures would find those moved. But between these, lips that open or stretch
+grow flatter. Corners that are raised push the cheek up into a
 bulge below the eye, beside which the fold from nose to mouth deepens.
 """
 
