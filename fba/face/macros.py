@@ -18,14 +18,14 @@ OPEN_MOUTH = MappingProxyType(
         "raise_b_midlip": -600,
         "lower_t_lip_lm": -50,
         "lower_t_lip_rm": -50,
-        "raise_b_lip_lm": -500,
-        "raise_b_lip_rm": -500,
+        "raise_b_lip_lm": -440,
+        "raise_b_lip_rm": -440,
         "lower_t_midlip_o": -50,
         "raise_b_midlip_o": -600,
         "lower_t_lip_lm_o": -50,
         "lower_t_lip_rm_o": -50,
-        "raise_b_lip_lm_o": -500,
-        "raise_b_lip_rm_o": -500,
+        "raise_b_lip_lm_o": -430,
+        "raise_b_lip_rm_o": -430,
     }
 )
 """FAPs, by name, of a mouth that is wide open: the jaw does not part the lips by itself (FAP 3)."""

@@ -10,9 +10,15 @@ from meshes import Mesh, join, mirror, tube
 
 from fba.arrays import Float64
 
-ENAMEL = np.array([0.93, 0.88, 0.77])
+ENAMEL = np.array([0.78, 0.68, 0.55])
 """Linear light."""
-NECK = np.array([0.86, 0.76, 0.58])
+NECK = np.array([0.66, 0.54, 0.37])
+EDGE = np.array([0.66, 0.62, 0.54])
+"""The edge of a crown, through which the dark behind it is seen."""
+CANINE = np.array([0.98, 0.94, 0.88])
+"""Factors of the colour of canines, which are yellower."""
+UNEVEN = 0.05
+"""Share by which teeth are darker or brighter than each other."""
 GUM = np.array([0.60, 0.225, 0.20])
 TONGUE = np.array([0.58, 0.155, 0.135])
 TONGUE_UNDER = np.array([0.46, 0.120, 0.110])
@@ -26,6 +32,11 @@ SINKING = np.array([0.0, 0.0, 0.3, 1.5, 3.4, 6.2, 8.8]) / 1000
 """Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides them."""
 SUNK_GUM = 0.4
 """Share of that by which their gum is deeper: so low a crown is short, too."""
+RISING = np.array([0.0, 0.55, 0.1, 0.5, 0.9, 1.3, 1.8]) / 1000
+"""Metres by which the edge of each upper tooth is higher than that of the first: a line that bends as the
+lower lip does, with lateral incisors above it."""
+CORNERS = (0.45, 1.0)
+"""Millimetres by which an edge is rounded off at its corners, towards the midline and away from it."""
 TURNS = np.radians([0, 30, 60, 90, 120, 150, 180, 225, 270, 315])
 """Places of the vertices around a crown, denser in front: behind, hardly anything is seen."""
 AROUND = len(TURNS)
@@ -44,10 +55,10 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
     for row in rows:
         width, height, thick = (float(row[name]) / 1000 for name in ("width", "height", "thick"))
         place, turn = _arch(along + width / 2, sign)
-        sunk = 0.0 if upper else SINKING[int(row["place"]) - 1]
-        height -= (1 - SUNK_GUM) * sunk
+        number = int(row["place"]) - 1
+        height -= RISING[number] if upper else (1 - SUNK_GUM) * SINKING[number]
         tooth = _tooth(width, height, thick, float(row["flat"]), int(row["place"]), sign)
-        place[1] -= sunk
+        place[1] += RISING[number] if upper else -SINKING[number]
         placed = _place_tooth(tooth, place, turn)
         meshes += [(mesh[0] + front, *mesh[1:]) for mesh in (placed, mirror(placed))]
         along += width + 0.00008
@@ -99,8 +110,8 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     if place == 3:  # a canine has a point
         vertices[0, :, 1] += sign * 0.0011 * np.abs(cx)
         vertices[1, :, 1] += sign * 0.0007 * np.abs(cx)
-    corner = 0.0001 * np.abs(cx) ** 6 * sign
-    vertices[0, :, 1] += corner
+    corner = np.where(cx > 0, CORNERS[1], CORNERS[0]) / 1000 * np.abs(cx) ** 12 * min(width / 0.0085, 1.0)
+    vertices[:2, :, 1] += corner * sign * np.array([[1.0], [0.75]])
     cap = vertices[0].mean(axis=0) * np.array([1, 0, 1]) + np.array(
         [0, sign * (0.0 if flat < 0.5 else 0.0006), 0]
     )
@@ -113,14 +124,19 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
     # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
-    shaded = (0.94, 0.92, 0.90) if sign > 0 else (0.90, 0.85, 0.83)
+    shaded = (0.90, 0.86, 0.83) if sign > 0 else (0.88, 0.82, 0.79)
     behind = np.array(shaded) ** (max(place - 2, 0) ** 1.15)
+    behind *= 1 + UNEVEN * np.random.default_rng(place).uniform(-1, 1)
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * behind
+    if place < 3:
+        colour[:2] *= EDGE / ENAMEL * [[1.0], [1.04]]
+    elif place == 3:
+        colour *= CANINE
     fissure = 1.0 if flat < 0.5 else 0.72
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1] * fissure])
-    # Between the teeth it is darker.
-    side = np.concatenate([np.tile(np.abs(cx) ** 6, len(rows)), [0.0]])
-    colours = colours * (1 - side[:, None] * (0.04, 0.09, 0.12))
+    # Between the teeth it is darker: a thin line.
+    side = np.concatenate([np.tile(np.abs(cx) ** 10, len(rows)), [0.0]])
+    colours = colours * (1 - side[:, None] * (0.34, 0.42, 0.46))
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 

@@ -247,10 +247,17 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     # The lower lid ends in a fold.
     fold = np.where(near, np.exp(-(((ring - 7.0) / 1.3) ** 2)) * 0.35, 0.0) * smoothstep((-4 - y) / 5)
     colour = _blend(colour, np.array(looks.socket), fold * (1 - smoothstep((x - 34) / 8)))
+    # The upper lid is thin and a little darker; it ends in a crease.
+    upper = near & (y > -3)
+    thin = np.where(upper, smoothstep((ring - 3.6) / 1.2) * (1 - smoothstep((ring - 6.4) / 1.6)), 0.0)
+    crease = np.where(upper, np.exp(-(((ring - 7.7) / 0.55) ** 2)), 0.0)
+    crease *= smoothstep((x - 21.0) / 5.0) * (1 - smoothstep((x - 39.0) / 5.0))
+    colour = _blend(colour, np.array(looks.socket), 0.30 * thin)
+    colour = _blend(colour, np.array(looks.socket) * 0.80, 0.42 * crease)
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.55, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.20, line)
-    line *= smoothstep((x - 19.0) / 5.0) * (1 - 0.85 * smoothstep((x - 37.5) / 4.0))
+    line *= smoothstep((x - 22.5) / 5.0) * (1 - 0.85 * smoothstep((x - 37.5) / 4.0))
     colour = _blend(colour, np.array(ALEX.brow), line)
     caruncle = near & (ring < 1.6) & (x < 24)
     return np.where(caruncle[:, None], np.array(looks.caruncle) + noise(p, 0.001, 9)[:, None] * 10, colour)
@@ -258,18 +265,27 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
 
 def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Looks) -> Float64:
     near = ring < 90
-    corner = smoothstep((np.abs(p[:, 0]) - 0.015) / 0.012)
-    border = np.where(side > 0, 4.6, 4.6) - 1.7 * corner  # the red of the lips is narrower in the corners
-    red = np.where(near, smoothstep((border + 0.8 - ring) / 1.7), 0.0)
+    x, lower = np.abs(p[:, 0]), side < 0
+    corner = smoothstep((x - 0.015) / 0.012)
+    # The red of the lips is narrower in the corners; that of the lower lip is soft at its edge.
+    border = np.where(lower, 4.7 - 1.3 * smoothstep((x - 0.007) / 0.020), 4.6 - 1.7 * corner)
+    soft = np.where(lower, 2.6, 1.8)
+    red = np.where(near, smoothstep((border + 0.45 * soft - ring) / soft), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
     lip = (
         np.array(looks.lip)
-        + lines[:, None] * np.array([9, 9, 8.0])
-        + (side > 0)[:, None] * np.array([-8, -7, -6.0])
+        + lines[:, None] * np.where(lower[:, None], [13, 12, 11.0], [10, 10, 9.0])
+        + np.where(lower[:, None], [-20, -23, -19.0], [-8, -7, -6.0])
     )
-    colour = _blend(colour, lip, red * 0.85)
+    # Below it is a shade, and its inner half is darker: flesh that bends in.
+    below = np.where(near & lower, np.exp(-(((ring - border - 2.4) / 1.5) ** 2)), 0.0) * (1 - corner)
+    colour = _blend(colour, np.array(looks.blush) * 0.86, below * 0.34)
+    lip = _blend(lip, np.array(looks.lip_line), np.where(lower, 0.38 * smoothstep((3.6 - ring) / 2.8), 0.0))
+    colour = _blend(colour, lip, red * 0.88)
     seam = np.where(near, smoothstep((2.1 - ring) / 1.2), 0.0) * (1 - 0.6 * corner)
     colour = _blend(colour, np.array(looks.lip_line), seam * 0.45)
+    # The corners lie in the shade of the cheeks.
+    colour = _blend(colour, np.array(looks.lip_line), 0.42 * _spot(p, (26.2, -69.6, 4.6), 4.6) ** 1.5)
     inside = np.where(near, smoothstep((0.6 - ring) / 1.2), 0.0)
     colour = _blend(colour, MOUTH, inside)
     # A light edge above the upper lip.

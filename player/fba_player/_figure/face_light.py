@@ -29,7 +29,7 @@ MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
 """FAPs of a mouth so wide open that light falls in."""
 FREE_LIGHT = (0.9, 0.8, 0.0, 0.3)
 """Light on a tongue that is put out: key, sky, through, rim."""
-TEETH_FILL_SHARE = 0.76
+TEETH_FILL_SHARE = 0.56
 """Share of the missing light that is added on teeth when the mouth is open."""
 UPPER_LIDS, CLOSED = (19, 20), 1024
 """FAPs of the upper lids, and the value that closes them."""

@@ -37,6 +37,14 @@ MAX_DIP_CORRECTION = 0.02
 """Largest correction for an edge that dips into the eyeball, as a share of its radius."""
 BRIDGING_PASSES = 3
 """Number of passes: moving a vertex off the eyeball may pull another edge into it."""
+SETTLED = 1.21
+"""Radii of the eyeball beyond which the skin above an upper lid sinks as the lid closes over the ball."""
+SETTLING = ((0.0, 0.22), (0.75, 1.0))
+"""Shares of the margin's motion between which that fades in, and between which it fades out again."""
+MOST_SETTLED = 0.25
+"""How far it sinks at most, in radii of the eyeball."""
+WIDE = (0.35, 0.8)
+"""Heights of the opening, as shares of its largest, between which that begins and is full."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +128,22 @@ def slide_lid(
         shifts[k, :, 2] = (depth * cos - height * sin) * grown - depth
     shifts[way == 0] = 0.0
     return shifts
+
+
+def settle_fold(points: Float64, shifts: Float64, share: Float64, opening: Opening, eye: Eye) -> Float64:
+    """Return the shifts (K, N, 3) of an upper lid that closes, with the skin of its fold sunk to the eyeball.
+
+    share: (N,), share of the margin's motion at each point. It sinks with the way that it has gone.
+    """
+    (start, full), (last, end) = SETTLING
+    window = smoothstep((share - start) / (full - start)) * (1 - smoothstep((share - last) / (end - last)))
+    gap = np.interp(points[:, 0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
+    wide = smoothstep((gap / gap.max() - WIDE[0]) / (WIDE[1] - WIDE[0]))
+    arms = points + shifts - eye.centre
+    away = np.linalg.norm(arms, axis=2)
+    gone = np.clip(-shifts[..., 1] / np.maximum(share * gap, 1e-9), 0.0, 1.0)
+    sinks = np.clip(away - SETTLED * eye.radius, 0.0, MOST_SETTLED * eye.radius) * gone * window * wide
+    return np.asarray(shifts - arms * (0, 1, 1) * (sinks / away)[:, :, None])
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,8 @@
 
 Every vertex of a lid stays in its own upright plane and turns about the eyeball. A lid closes column by
 column, each in proportion to its own opening, so that the margins meet along their whole length however the
-way is split between upper and lower lid.
+way is split between upper and lower lid. The skin above the upper lid comes out of its fold and down to the
+eyeball.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from fba.face.authoring.regions._eye_opening import (
     measure_profile,
     push_edges_outside,
     push_vertices_outside,
+    settle_fold,
     slide_lid,
 )
 from fba.face.authoring.regions._eyes import Eye
@@ -138,6 +140,8 @@ def lid_motion(
     if eye.flat:  # the lids of a drawn eye slide in front of it, where no ball is in their way
         motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
     else:
+        if lid == "upper" and not follows:
+            shifts = settle_fold(points, shifts, share[vertices], opening, eye)
         profile = measure_profile(eye, parts, edge_length(marks, own, other))
         # margins that lie in the eyeball, or close to it, meet where they are
         sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > MAX_SUNK * profile.size

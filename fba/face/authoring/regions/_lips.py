@@ -1,11 +1,13 @@
 """The lips: FAPs 4-13, 16, 17 (inner contour) and 51-60 (outer contour).
 
 Eight handles, each a pair of an inner and an outer point, spread smoothly along the lips and into the skin
-around them. The inner FAP moves what lies towards the inner contour, the outer FAP the rest; sent
-together, as they mostly are, they move the lip as a whole.
+around them. The corners of a lip that opens are arcs, not the ends of a straight line. The inner FAP moves
+what lies towards the inner contour, the outer FAP the rest; sent together, as they mostly are, they move the
+lip as a whole.
 
 A smile also slides corners that are drawn apart back round the teeth. Lips do not grow thin: their contours
-have FAPs of their own, and captures would find those moved. Corners that are raised push the cheek up into a
+have FAPs of their own, and captures would find those moved. But between these, lips that open or stretch
+grow flatter. Corners that are raised push the cheek up into a
 bulge below the eye, beside which the fold from nose to mouth deepens.
 """
 
@@ -18,7 +20,7 @@ import numpy as np
 
 from fba.arrays import Float64, Intp
 from fba.face.authoring.surface._fold_limits import Limiter
-from fba.face.authoring.surface._motion import Motion, ease_field
+from fba.face.authoring.surface._motion import Motion, ease_field, unfold
 from fba.face.authoring.surface._motion_limits import (
     coupled_motions,
     eased_linear_motion,
@@ -42,9 +44,9 @@ BEND = 0.62
 """From there on, its way back as a share of its way to the side."""
 BULGE = (0.62, 0.40)
 """How far the cheek comes out, and up, as shares of the way of a raised corner."""
-FOLD = -0.20
+FOLD = -0.27
 """The same of the fold beside it."""
-CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.13)
+CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.12)
 """Where they are: shares of feature points of the left side, and their breadth in ES0."""
 RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
 SMILE_NEAR, SMILE_REACH = 0.54, 0.78
@@ -80,6 +82,19 @@ ALONG = {
 PUSH = (16, 17)
 OUTER_PUSH = 0.9
 """Share of a push of the inner contour with which the outer one, which has no such FAP, follows."""
+ARCS = {
+    8: "upper left", 9: "upper right", 10: "lower left", 11: "lower right",
+    55: "upper left", 56: "upper right", 57: "lower left", 58: "lower right",
+}  # fmt: skip
+"""Handles beside the corners of the mouth, by the FAPs that make an arc between them."""
+ARC = (2.2, 0.0)
+"""How steep the arc begins on the inner and the outer contour, as shares of the motion of the handle."""
+ARC_VALUE = 300.0
+"""Value up to which the arc grows."""
+FLATTENS = dict.fromkeys((4, 5, 8, 9, 10, 11, 51, 52, 55, 56, 57, 58), -1.0) | dict.fromkeys(STRETCHING, 1.0)
+"""FAPs that make the red of the lips flatter, and the sign of the values that do."""
+FLATTER, FLAT_VALUE = 0.07, 400.0
+"""By how much, as a share of the way of the handle, and the value up to which that grows."""
 REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.3
@@ -97,6 +112,8 @@ never get negative."""
 class _Lips:
     field: dict[str, Float64]
     """(N,) by handle: share of its motion at each vertex."""
+    arc: dict[str, Float64]
+    """(N,) by handle of `ARCS`: what the arc beside it adds to that share."""
     inward: Float64
     """(N,) 1 on the inner contour and behind it, 0 on the outer contour and beyond."""
 
@@ -129,6 +146,9 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             inner, outer = field * inward, field * (1 - inward)
             pair = coupled_motions(limiter, (inner, inner), (outer, outer), number)
             motions[number], motions[mate] = pair
+    for number in FLATTENS.keys() & motions.keys():
+        shaped = _with_shape(marks, lips, number, motions[number])
+        motions[number] = stop_at_folds(limiter, unfold(surface, limiter, shaped, pinned, False))
     return {fap: add_smile(marks, limiter, fap, motion) for fap, motion in motions.items()}, lost
 
 
@@ -176,23 +196,30 @@ def _fap_field(lips: _Lips, number: int) -> Float64:
 def _fields(marks: Landmarks) -> _Lips:
     """Return the motion of each handle spread along the contours and into the skin around them."""
     names = list(HANDLES)
+    arcs = sorted(set(ARCS.values()))
     size = len(marks.surface)
-    values = np.full((size, len(names)), np.nan)
+    values = np.full((size, len(names) + len(arcs)), np.nan)
     for number, side in enumerate(("inner", "outer")):
         for half, handles in (("upper", UPPER), ("lower", LOWER)):
             walk = marks.contour(f"{half} {side} lip")
             if len(walk):
                 points = [HANDLES[name][number] for name in handles]
                 nodes = [None if _twin(marks, point) else marks.vertex.get(point) for point in points]
+                places = _contour_places(marks.surface.vertices, walk, nodes)
                 values[walk] = 0.0
-                values[walk[:, None], [names.index(name) for name in handles]] = _contour_shares(
-                    marks.surface.vertices, walk, nodes
+                values[walk[:, None], [names.index(name) for name in handles]] = smooth_weights(
+                    places, len(nodes)
                 )
+                for name in arcs if not any(_twin(marks, point) for point in points) else ():
+                    if name in handles:
+                        away = np.minimum(np.abs(places - (4 if "right" in name else 0)), 1.0)
+                        values[walk, len(names) + arcs.index(name)] = ARC[number] * away * (1 - away) ** 3
     for name, pair in HANDLES.items():
         for point in pair:
             if marks.has(point) and not _twin(marks, point) and not np.isnan(values[marks.vertex[point], 0]):
                 # where one contour runs through a point of the other, the point decides
-                values[marks.vertex[point]] = np.array(names) == name
+                values[marks.vertex[point]] = np.array(names + arcs) == name
+                values[marks.vertex[point], len(names) :] = 0.0
     fixed = np.flatnonzero(~np.isnan(values[:, 0]))
     es = marks.fapu.ES * 1024
     near = marks.surface.distances(fixed, limit=2 * REACH * es)
@@ -200,8 +227,12 @@ def _fields(marks: Landmarks) -> _Lips:
     free = reachable_region(near, far, REACH * es)
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
-    field = {name: trim_small(solved[:, k]) for k, name in enumerate(names)}
-    return _Lips(field, _inward(marks))
+    shares = [trim_small(column) for column in solved.T]
+    return _Lips(
+        dict(zip(names, shares, strict=False)),
+        dict(zip(arcs, shares[len(names) :], strict=True)),
+        _inward(marks),
+    )
 
 
 def _inward(marks: Landmarks) -> Float64:
@@ -223,10 +254,9 @@ def _inward(marks: Landmarks) -> Float64:
     return smoothstep(field[:, 0])
 
 
-def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) -> Float64:
-    """Return (M, K) weights of the vertices of a walk for the K nodes along it, with a sum of 1 everywhere.
-
-    A weight is 1 at its own node, 0 at the others, and smooth between.
+def _contour_places(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) -> Float64:
+    """Return (M,) places of the vertices of a walk among the K nodes along it: the number of each, 0..K-1, at
+    it, and smooth between.
 
     vertices: (N, 3). walk: (M,) vertices from the first to the last node. nodes: the vertex of each
     node, None for nodes that the face does not have: they lie evenly between the others.
@@ -251,11 +281,11 @@ def _contour_shares(vertices: Float64, walk: Intp, nodes: Sequence[int | None]) 
         number = np.array([k for _, k in known])
     else:
         number = PchipInterpolator(*zip(*known, strict=True))(length)
-    return smooth_weights(np.clip(number, 0, len(nodes) - 1), len(nodes))
+    return np.asarray(np.clip(number, 0, len(nodes) - 1))
 
 
 def smooth_weights(x: Float64, count: int) -> Float64:
-    """Return (M, count) weights of values at 0, 1, ... in the smooth curve through them, at x."""
+    """Return (M, count) weights of values at 0, 1, ... in the smooth curve through them, at x; sums are 1."""
     k = np.clip(np.floor(x).astype(np.intp), 0, count - 2)
     t = x - k
     start, end = 2 * t**3 - 3 * t**2 + 1, -2 * t**3 + 3 * t**2
@@ -270,6 +300,28 @@ def smooth_weights(x: Float64, count: int) -> Float64:
     np.add.at(weights, (row, k), start)
     np.add.at(weights, (row, k + 1), end)
     return weights
+
+
+def _with_shape(marks: Landmarks, lips: _Lips, fap: int, motion: Motion) -> Motion:
+    """Return the motion with the arc beside a corner of the mouth, and with lips that grow flatter."""
+    inner = fap < 50
+    if fap in ARCS:
+        arc = lips.arc[ARCS[fap]] * (lips.inward if inner else 1 - lips.inward)
+        motion = _adding(motion, arc[:, None] * marks.step(fap), (-ARC_VALUE, ARC_VALUE))
+    between = 4 * lips.inward * (1 - lips.inward) * np.clip(_fap_field(lips, fap), 0.0, 1.0)
+    size = float(np.linalg.norm(marks.step(fap))) * FLATTENS[fap] * FLATTER / 2
+    flatter = trim_small(between)[:, None] * -size * marks.surface.normals
+    low, high = sorted((0.0, FLATTENS[fap] * FLAT_VALUE))
+    return _adding(motion, flatter, (low, high))
+
+
+def _adding(motion: Motion, field: Float64, ends: tuple[float, float]) -> Motion:
+    """Return the motion with value x field (N, 3) of the surface added, for values between two ends."""
+    motion = _including(motion, np.flatnonzero(field.any(axis=1)))
+    values = np.union1d(motion.values, np.clip(ends, motion.values[0], motion.values[-1]))
+    ways = np.clip(values, *ends)[:, None, None]
+    shifts = np.stack([motion.shifts_at(value) for value in values]) + ways * field[motion.vertices]
+    return Motion(values, motion.vertices, shifts)
 
 
 def add_smile(marks: Landmarks, limiter: Limiter, fap: int, motion: Motion) -> Motion:

@@ -7,7 +7,7 @@ const KEY = [0.7, 0.68, 0.8]; // directions of key and rim light, as in shaders/
 const RIM = [-0.55, 0.5, -0.85];
 export const HARMONICS = 16;
 const MOUTH_CURVE = 0.4; // the first millimetres of an open mouth let in most of the light
-const TEETH_FILL = 0.76; // share of the missing light that is added on teeth when the mouth is open
+const TEETH_FILL = 0.56; // share of the missing light that is added on teeth when the mouth is open
 const FREE = [0.9, 0.8, 0, 0.3]; // on a tongue that is put out
 const STEPS = 100; // in which turns and mouth are rounded: light changes by less than can be seen
 
