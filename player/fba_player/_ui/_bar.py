@@ -76,7 +76,9 @@ class Bar:
         imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
         imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (1, 1))
+        imgui.push_style_color(imgui.Col_.window_bg, (*theme.GROUND[:3], 1.0))  # no legs shine through
         imgui.begin("##bar", None, STANDING)
+        imgui.pop_style_color()
         imgui.pop_style_var(4)
         margin = min(SIDE_MARGIN, wide * 0.05)
         lanes = max(tall - HEIGHT, 0.0)

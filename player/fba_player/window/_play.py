@@ -14,6 +14,7 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
+from fba.compiled import compilation_listener
 from fba.face import Resolver
 from fba.parameters import BapTable
 from fba.tracks import BodyTrack, FaceTrack
@@ -92,10 +93,13 @@ def play(
             surface = stack.enter_context(Surface(size))
         else:
             surface.memory = Memory()
+        stack.enter_context(compilation_listener(surface.tell_of_compiling))
         if callable(animation):
             surface.open(title or "fba")
+            surface.tell("Preparing the figure", 0.25)
             animation = animation()
         scene = _scene_of(animation)
+        surface.tell("Preparing light and panels", 0.5)
         source = Source(scene, file, bap_steps=bap_steps, warnings=warnings)
         window = stack.enter_context(
             Window(scene, title=title, size=size, camera=camera, loop=loop, source=source, surface=surface)
@@ -113,7 +117,10 @@ def play(
         if resumed is not None:
             _resume(session, resumed)
             paused = not resumed.playing
-        if window.update() and not paused:  # the first picture takes long: time begins when it is there
+        surface.tell("Drawing the first picture", 0.75)
+        shown = window.update()
+        surface.show_scene()
+        if shown and not paused:  # the first picture takes long: time begins when it is there
             window.transport.play()
         window.run()
         surface.resumed = _state(session) if session.resumes else None
