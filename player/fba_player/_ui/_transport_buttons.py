@@ -21,7 +21,7 @@ BUTTON_GAP = 4.0
 """Width and height of a button, and the space between two, in points."""
 
 LEAST_SLIDER, SLIDER_GAP, SPEED_WIDTH = 60.0, 26.0, 38.0
-"""Least width of the slider of the speed, the space around it, and that for the speed beside it, in points."""
+"""Least width of the slider of the speed, the space around it and for the speed beside it, in points."""
 
 
 class Buttons:
@@ -30,7 +30,7 @@ class Buttons:
     def __init__(self) -> None:
         self.slider = (0.0, 0.0)
         self.speed = self.taken = (0.0, 0.0)
-        """Left and right end of the speed slider, of the speed beside it, and of the buttons before; for tests."""
+        """Left and right end of the slider, of the speed beside it, of the buttons before; for tests."""
 
     def draw(self, session: Session, wide: float, y: float) -> None:
         """Draw the row. wide: of the display, y: of the upper edge, in points."""

@@ -50,7 +50,7 @@ def opening_picture(size: tuple[int, int], scale: float, name: str, step: str, d
 
 @lru_cache(maxsize=1)
 def _backdrop(size: tuple[int, int]) -> UInt8:
-    """Return the backdrop that studio.frag draws, top row first, so that nothing jumps when the figure appears."""
+    """Return the backdrop of studio.frag, top row first, so that nothing jumps when the figure appears."""
     across, up = np.linspace(-1, 1, size[0]), np.linspace(1, -1, size[1])[:, None]
     share = smoothstep((up + 1.1) / 2.1)[..., None]
     light = (1 - share) * (0.155, 0.165, 0.185) + share * (0.42, 0.44, 0.475)

@@ -90,7 +90,7 @@ class Surface:
             raise
 
     def tell(self, step: str, done: float) -> None:
-        """Show what is being prepared and how much is done, until `show_scene`; not where a file is shown again."""
+        """Show what is being prepared, until `show_scene`, and the share done; not for a file shown again."""
         if self.window is not None and self.resumed is None:
             self._step = (step, done)
             self._draw_opening()
