@@ -269,7 +269,8 @@ def test_the_opening_page_says_what_is_prepared_and_how_far(
     played(monkeypatch, make, lambda _: announce_compilation(), surface=surface, title="talk")
     steps, shares = [step for _, step, _ in told], [share for *_, share in told]
     assert {name for name, *_ in told} == {"talk"}
-    assert shares == sorted(shares) and len(set(steps)) == len(steps) >= 4
+    assert shares == sorted(shares)
+    assert len(set(steps)) == len(steps) >= 4
     assert COMPILING.format(FUNCTIONS_TOLD) in steps  # not the one after the first picture
     assert COMPILING.format(FUNCTIONS_TOLD + 1) not in steps
 
@@ -283,6 +284,5 @@ def test_the_opening_page_has_its_parts(size: tuple[int, int], scale: float) -> 
     lit = [(page[..., :3] == ACCENT).all(axis=2).any(axis=0).sum() for page in (half, whole)]
     assert lit[1] == pytest.approx(220 * scale if size[1] > 40 else 0, abs=2)
     assert lit[0] == pytest.approx(lit[1] / 2, abs=2)
-    assert (half[-1, :, :3] == half[-1, ::-1, :3]).all() and half[-1].mean() > half[
-        0
-    ].mean()  # lit from above
+    assert (half[-1, :, :3] == half[-1, ::-1, :3]).all()
+    assert half[-1].mean() > half[0].mean()  # lit from above
