@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,14 @@ from fba.compiled import announce_compilation
 from fba.errors import DisplayError
 from fba_player.scene.scene import Scene
 from fba_player.session._memory import Memory
+from fba_player.session._session import Notice
 from fba_player.session._source import Source
 from fba_player.window._opening import ACCENT, opening_picture
 from fba_player.window._play import play
 from fba_player.window._window import Window
 from fba_player.window.surface import COMPILING, FUNCTIONS_TOLD, Surface
+
+SOUND = files("fba") / "samples" / "hello.wav"
 
 graphics.imported("glfw")
 graphics.imported("imgui_bundle")
@@ -116,8 +120,10 @@ def test_a_file_that_changes_is_shown_again_where_it_was(
     surface: Surface, talking: Animation, talk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fba_player.window._window.LOOK_SECONDS", 0.0)
+    monkeypatch.setattr("fba_player.sound._player.open_audio", lambda *_, **__: None)  # no sound device
 
     def edit(window: Window) -> None:
+        assert ["no sound device" in notice.text for notice in window.session.notices()] == [True]
         window.transport.seek(0.2)
         window.session.viewpoint.camera = window.session.viewpoint.camera.orbit(30, 0)
         window.session.open.add("view")
@@ -129,7 +135,7 @@ def test_a_file_that_changes_is_shown_again_where_it_was(
         raise AssertionError("it does not look")
 
     cameras = []
-    options = {"surface": surface, "file": talk, "paused": True}
+    options = {"surface": surface, "file": talk, "paused": True, "audio": SOUND}
     assert played(monkeypatch, fba.read(talk), edit, **options) == (talk,)
     state = surface.resumed
     assert state is not None
@@ -142,9 +148,19 @@ def test_a_file_that_changes_is_shown_again_where_it_was(
         assert not session.transport.playing
         assert "view" in session.open
         assert session.zoom.high - session.zoom.low == pytest.approx(0.18)
-        assert any("changed on disk" in notice.text for notice in session.notices())
+        assert ["changed on disk" in notice.text for notice in session.notices()] == [True]
+        assert not told_early  # a notice that begins before a slow first picture is not read
         close(window)
 
+    told_early: list[Notice] = []
+    update = Window.update
+
+    def first(window: Window) -> bool:
+        if not window.pictures:
+            told_early.extend(window.session.notices())
+        return update(window)
+
+    monkeypatch.setattr(Window, "update", first)
     assert played(monkeypatch, fba.read(talk), look, **options) == ()
     assert cameras == [state.view]
     assert surface.resumed is None
