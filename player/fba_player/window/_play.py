@@ -14,7 +14,6 @@ import numpy as np
 from fba.animation import Animation
 from fba.arrays import Float32, Float64
 from fba.atomic import PathLike
-from fba.compiled import compilation_listener
 from fba.face import Resolver
 from fba.parameters import BapTable
 from fba.tracks import BodyTrack, FaceTrack
@@ -93,7 +92,6 @@ def play(
             surface = stack.enter_context(Surface(size))
         else:
             surface.memory = Memory()
-        stack.enter_context(compilation_listener(surface.tell_of_compiling))
         if callable(animation):
             surface.open(title or "fba")
             surface.tell("Preparing the figure", 0.25)

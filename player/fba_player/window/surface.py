@@ -6,11 +6,13 @@ It imports little, so that the window is there before the long imports.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any, Self
 
+from fba.compiled import compilation_listener
 from fba.errors import DisplayError
 from fba_player.gl._context import (
     OPENGL,
@@ -68,6 +70,7 @@ class Surface:
         self.title = ""
         self._step: tuple[str, float] = ("", 0.0)
         self._compiled = 0
+        self._listening = ExitStack()
         self._problems: list[str] = []
 
     def open(self, title: str) -> None:
@@ -80,6 +83,7 @@ class Surface:
             self.glfw.set_window_title(self.window, title)
             return
         self.glfw = start_glfw(self._problems)
+        self._listening.enter_context(compilation_listener(self.tell_of_compiling))
         try:
             self._open(title)
             self.tell("Starting", 0.05)
@@ -109,6 +113,7 @@ class Surface:
 
     def close(self) -> None:
         """Close the window; safe to call twice."""
+        self._listening.close()
         if self.gl is not None:
             self.gl.release()
             self.gl = None
