@@ -47,6 +47,7 @@ def window(monkeypatch: pytest.MonkeyPatch) -> Window:
     stand_in = Window()
     monkeypatch.setattr(player, "play", stand_in)
     monkeypatch.setattr(player, "check_display", lambda: None)
+    monkeypatch.setattr(player.Surface, "open", lambda *_: None)
     return stand_in
 
 
@@ -268,6 +269,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, dict[str, Any]]]:
     """What windows were to show, and how."""
     found: list[tuple[Any, dict[str, Any]]] = []
     monkeypatch.setattr(player, "check_display", lambda: None)
+    monkeypatch.setattr(player.Surface, "open", lambda *_: None)
     monkeypatch.setattr(player, "play", lambda build, **options: found.append((build(), options)))
     return found
 

@@ -151,6 +151,9 @@ def _play(
             for file, name, animation in zip(files, scenes.display_names(files), animations, strict=True)
         ]
 
+        title = " | ".join(names)
+        shown.surface.open(title)  # before imports that take long
+
         def build() -> Showable:
             scene: Showable = scenes.build_scene(animations, names, how, over=compare)
             _check_start(scene, start, growing=bool(streams))
@@ -161,7 +164,7 @@ def _play(
         single = len(files) == 1 and not streams and str(files[0]) != "-" and not scenes.is_pipe(files[0])
         return player.play(
             build,
-            title=" | ".join(names),
+            title=title,
             camera=how.camera,
             start=start,
             audio=audio,
@@ -189,10 +192,12 @@ def _play(
 def _puppet(how: SceneOptions, shown: _Shown) -> tuple[Path, ...]:
     """Open a window with a neutral figure and sliders that move it; return the files dropped onto it."""
     from fba import player
-    from fba_player.session.performer import neutral
 
     given = [file.name for file in (how.model, how.body) if file is not None]
     title = " ".join(filter(None, [how.figure, *given])) or "puppet"
+    shown.surface.open(title)  # before imports that take long
+    from fba_player.session.performer import neutral
+
     person = how.body is not None or how.model is None
     return player.play(
         lambda: scenes.build_scene([neutral(body=person)], [title], how),

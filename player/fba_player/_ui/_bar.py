@@ -27,7 +27,7 @@ TRACK_TOP = 24.0
 TRACK_HEIGHT = 40.0
 BUTTONS = TRACK_TOP + TRACK_HEIGHT + 13.0
 """Upper edge and height of the timeline, and the upper edge of the buttons, in points."""
-LEAST_WIDTH, LEAST_HEIGHT = 520.0, 400.0
+LEAST_WIDTH, LEAST_HEIGHT = 520.0, 440.0
 """Least size of a window that has lanes, in points."""
 ZOOM_BAR = (4.0, 6.0)
 """Distance below the timeline and height of the bar that shows which part of the time is shown, in points."""
@@ -76,7 +76,9 @@ class Bar:
         imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
         imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
         imgui.push_style_var(imgui.StyleVar_.window_min_size, (1, 1))
+        imgui.push_style_color(imgui.Col_.window_bg, (*theme.GROUND[:3], 1.0))  # no legs shine through
         imgui.begin("##bar", None, STANDING)
+        imgui.pop_style_color()
         imgui.pop_style_var(4)
         margin = min(SIDE_MARGIN, wide * 0.05)
         lanes = max(tall - HEIGHT, 0.0)

@@ -100,7 +100,7 @@ def draw_name(session: Session, display: tuple[float, float], taken: float, room
 
 def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, float]) -> float:
     """Draw a button for each panel, or one for all, in the upper right corner; return their left edge."""
-    if not buttons_height(display):
+    if not buttons_bottom(display):
         return display[0]
     labels = [panel.label for panel in panels]
     wide = _width(labels)
@@ -133,9 +133,9 @@ def draw_buttons(session: Session, panels: list[Panel], display: tuple[float, fl
     return left
 
 
-def buttons_height(display: tuple[float, float]) -> float:
-    """Return the height of the buttons of the panels in points: 0 in a display that has no room for them."""
-    return 0.0 if display[0] < 130 or display[1] < 200 else BUTTONS_HEIGHT
+def buttons_bottom(display: tuple[float, float]) -> float:
+    """Return the points that the buttons of the panels take at the top; 0 in a display without room."""
+    return 0.0 if display[0] < 130 or display[1] < 200 else EDGE + BUTTONS_HEIGHT
 
 
 def _width(labels: list[str]) -> float:

@@ -20,8 +20,8 @@ BUTTON_SIZE = 30.0
 BUTTON_GAP = 4.0
 """Width and height of a button, and the space between two, in points."""
 
-LEAST_SLIDER, SLIDER_GAP = 70.0, 26.0
-"""Least width of the slider of the speed, and the space around it, in points."""
+LEAST_SLIDER, SLIDER_GAP, SPEED_WIDTH = 60.0, 26.0, 38.0
+"""Least width of the slider of the speed, the space around it and for the speed beside it, in points."""
 
 
 class Buttons:
@@ -29,7 +29,8 @@ class Buttons:
 
     def __init__(self) -> None:
         self.slider = (0.0, 0.0)
-        """Left and right end of the speed slider in points; for tests."""
+        self.speed = self.taken = (0.0, 0.0)
+        """Left and right end of the slider, of the speed beside it, of the buttons before; for tests."""
 
     def draw(self, session: Session, wide: float, y: float) -> None:
         """Draw the row. wide: of the display, y: of the upper edge, in points."""
@@ -67,6 +68,8 @@ class Buttons:
                     act(session, action)
                 tooltip(text, key_of(action))
                 x += size + gap
+        self.taken = (SIDE_MARGIN, x)
+        self.slider = self.speed = (0.0, 0.0)
         if room:
             self._right(session, wide, y, x)
 
@@ -101,7 +104,7 @@ class Buttons:
                 text += f"\nbegins {abs(session.sound_offset):.2f} s {when}"
             buttons.append(("mute", icons.muted if quiet else icons.sound, text, False))
         x = wide - SIDE_MARGIN + gap
-        if x - (len(buttons) + 1) * (size + gap) - taken - SLIDER_GAP >= LEAST_SLIDER:
+        if x - (len(buttons) + 1) * (size + gap) - taken - SLIDER_GAP - SPEED_WIDTH >= LEAST_SLIDER:
             buttons.insert(4, ("lanes", icons.lanes, "lanes: what is said, felt and heard; all; none", False))
         for action, icon, text, lit in buttons:
             x -= size + gap
@@ -114,25 +117,26 @@ class Buttons:
                 louder = session.audio.volume + 0.05 * imgui.get_io().mouse_wheel
                 session.audio.volume = min(max(louder, 0.0), 1.0)
             tooltip(text, key_of(action))
-        slider = min(118.0, x - taken - SLIDER_GAP)
-        if slider < LEAST_SLIDER:
-            return
         text = f"{transport.speed:g}x"
         wide_text = imgui.calc_text_size(text).x
-        if x - slider - 12 - wide_text - 10 > taken:
-            imgui.set_cursor_screen_pos((x - slider - 20 - wide_text, y + 7))
+        room = x - taken - SLIDER_GAP
+        if room < LEAST_SLIDER:
+            return
+        slider = min(118.0, room - SPEED_WIDTH if room >= LEAST_SLIDER + SPEED_WIDTH else room)
+        if x - slider - 20 - wide_text > taken + 6:  # else the tooltip says it
+            self.speed = (x - slider - 20 - wide_text, x - slider - 20)
+            imgui.set_cursor_screen_pos((self.speed[0], y + 7))
             imgui.text_colored(theme.FAINT if transport.speed == 1.0 else theme.ACCENT, text)
-            text = ""
         self.slider = (x - slider - 12, x - 12)
         imgui.set_cursor_screen_pos((self.slider[0], y + 2))
         imgui.set_next_item_width(slider)
         flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp
-        changed, speed = imgui.slider_float("##speed", transport.speed, SPEEDS[0], SPEEDS[-1], text, flags)
+        changed, speed = imgui.slider_float("##speed", transport.speed, SPEEDS[0], SPEEDS[-1], "", flags)
         if changed:
             transport.set_speed(snap_speed(speed))
         if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
             transport.set_speed(1.0)
-        tooltip("speed; double click for normal", f"{key_of('slower')} {key_of('faster')}")
+        tooltip(f"speed {text}; double click for normal", f"{key_of('slower')} {key_of('faster')}")
 
 
 def snap_speed(speed: float) -> float:

@@ -14,7 +14,7 @@ from fba_player._ui._bar import Bar
 from fba_player._ui._docks import EDGE, GAP, Dock, DockRequest, Docks, free_middle
 from fba_player._ui._hud import (
     WELCOME_HEIGHT,
-    buttons_height,
+    buttons_bottom,
     draw_buttons,
     draw_name,
     draw_notices,
@@ -146,7 +146,7 @@ class Gui:
         shown = 0.0 if session.bare else 1.0 / max(high, 1.0)
         hints = WELCOME_HEIGHT if session.greets and self._page is None else 0.0
         session.viewpoint.covered = shown * (self._bar_height((wide, high)) + hints)
-        session.viewpoint.covered_above = shown * buttons_height((wide, high)) if self._plays else 0.0
+        session.viewpoint.covered_above = shown * buttons_bottom((wide, high)) if self._plays else 0.0
 
     def _draw_all(self, display: tuple[float, float], io: imgui.IO) -> None:
         session = self.session

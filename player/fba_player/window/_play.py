@@ -94,8 +94,10 @@ def play(
             surface.memory = Memory()
         if callable(animation):
             surface.open(title or "fba")
+            surface.tell("Preparing the figure", 0.25)
             animation = animation()
         scene = _scene_of(animation)
+        surface.tell("Preparing light and panels", 0.5)
         source = Source(scene, file, bap_steps=bap_steps, warnings=warnings)
         window = stack.enter_context(
             Window(scene, title=title, size=size, camera=camera, loop=loop, source=source, surface=surface)
@@ -107,13 +109,18 @@ def play(
         window.transport.interpolate = interpolate
         _set_up(session, panels, warnings, newest, life=life, from_face=from_face)
         if audio is not None:
-            _add_sound(stack, session, audio, audio_offset)
+            _add_sound(stack, session, audio, audio_offset, again=resumed is not None)
         if start is not None:
             window.transport.seek(start)
         if resumed is not None:
             _resume(session, resumed)
             paused = not resumed.playing
-        if window.update() and not paused:  # the first picture takes long: time begins when it is there
+        surface.tell("Drawing the first picture", 0.75)
+        shown = window.update()
+        surface.show_scene()
+        if resumed is not None:  # said now, as preparing may take longer than notices are shown
+            session.say(f"{source.name} has changed on disk, and is shown again", about="reload")
+        if shown and not paused:  # the first picture takes long: time begins when it is there
             window.transport.play()
         window.run()
         surface.resumed = _state(session) if session.resumes else None
@@ -163,7 +170,7 @@ def _state(session: Session) -> Resumed:
 
 
 def _resume(session: Session, state: Resumed) -> None:
-    """Go on with a file that has changed where the window was, and say so."""
+    """Go on with a file that has changed where the window was."""
     transport, zoom = session.transport, session.zoom
     transport.mark_in, transport.mark_out = state.marks
     transport.seek(min(max(state.time, transport.start), transport.end))
@@ -175,18 +182,22 @@ def _resume(session: Session, state: Resumed) -> None:
         zoom.bound(transport.start, transport.end)
         zoom.zoom((high - low) / max(zoom.high - zoom.low, 1e-9), zoom.low)
         zoom.pan(low - zoom.low)
-    session.say(f"{session.source.name} has changed on disk, and is shown again", about="reload")
 
 
-def _add_sound(stack: contextlib.ExitStack, session: Session, path: PathLike, offset: float) -> None:
-    """Add a sound and its outline to the session, until the stack is closed."""
+def _add_sound(
+    stack: contextlib.ExitStack, session: Session, path: PathLike, offset: float, *, again: bool
+) -> None:
+    """Add a sound and its outline to the session, until the stack is closed.
+
+    again: whether the file was shown before, and a missing sound device is known.
+    """
     from fba_player.sound._player import open_audio
 
     session.audio = open_audio(path, session.transport, offset=offset)
     session.sound, session.sound_offset = path, offset
     if session.audio is not None:
         stack.enter_context(session.audio)
-    else:
+    elif not again:
         name = os.path.basename(os.fspath(path))
         text = f"There is no sound device: {name} is not heard, but recorded films have it"
         session.say(text, "warning", 8.0)

@@ -6,10 +6,13 @@ It imports little, so that the window is there before the long imports.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any, Self
 
+from fba.compiled import compilation_listener
 from fba.errors import DisplayError
 from fba_player.gl._context import (
     OPENGL,
@@ -18,18 +21,16 @@ from fba_player.gl._context import (
     missing_libraries,
     missing_text,
 )
-from fba_player.view._font import label_font, shortened
 from fba_player.window._display import HOW_WITHOUT, start_glfw
+from fba_player.window._opening import opening_picture
 
 if TYPE_CHECKING:
     from fba_player.session._memory import Memory
     from fba_player.view._camera import Camera
 
-OPENING_GREY = (118, 122, 127)
-OPENING_TEXT = (236, 238, 240)
-"""Colours of a window before its first picture, sRGB."""
-OPENING_TEXT_HEIGHT = 22.0
-"""Points."""
+COMPILING = "Compiling for this machine, on the first run only: {} functions"
+FUNCTIONS_TOLD = 3
+"""Functions to be compiled from which on the window says so."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,10 @@ class Surface:
         self.glfw: Any = None
         self.gl: Any = None
         self.window: Any = None
+        self.title = ""
+        self._step: tuple[str, float] = ("", 0.0)
+        self._compiled = 0
+        self._listening = ExitStack()
         self._problems: list[str] = []
 
     def open(self, title: str) -> None:
@@ -73,21 +78,42 @@ class Surface:
 
         Raises DisplayError without a display or OpenGL 3.3, which says what to do.
         """
+        self.title = title
         if self.window is not None:
             self.glfw.set_window_title(self.window, title)
             return
         self.glfw = start_glfw(self._problems)
+        self._listening.enter_context(compilation_listener(self.tell_of_compiling))
         try:
             self._open(title)
-            self._show_opening(title)
+            self.tell("Starting", 0.05)
             self.glfw.show_window(self.window)
-            self._show_opening(title)
+            self._draw_opening()  # what was drawn before may be lost
         except Exception:
             self.close()
             raise
 
+    def tell(self, step: str, done: float) -> None:
+        """Show what is being prepared, until `show_scene`, and the share done; not for a file shown again."""
+        if self.window is not None and self.resumed is None:
+            self._step = (step, done)
+            self._draw_opening()
+
+    def tell_of_compiling(self) -> None:
+        """Show that one more function is compiled, if the window is still being prepared."""
+        self._compiled += 1
+        if self._step[0] and self._compiled >= FUNCTIONS_TOLD and current_thread() is main_thread():
+            self._step, before = (COMPILING.format(self._compiled), self._step[1]), self._step
+            self._draw_opening()
+            self._step = before
+
+    def show_scene(self) -> None:
+        """Note that the window shows a scene from now on."""
+        self._step = ("", 0.0)
+
     def close(self) -> None:
         """Close the window; safe to call twice."""
+        self._listening.close()
         if self.gl is not None:
             self.gl.release()
             self.gl = None
@@ -148,28 +174,15 @@ class Surface:
                 "graphics driver"
             ) from error
 
-    def _show_opening(self, title: str) -> None:
-        """Show something at once: until the first picture, shaders are compiled and meshes prepared."""
+    def _draw_opening(self) -> None:
+        """Draw the opening page, without shaders, which take a while to be compiled."""
         size = self.pixels
-        if size[0] > 0 and size[1] > 0:
-            _draw_opening(self.gl, size, f"Opening {title} ...", self.scale)
-            self.glfw.swap_buffers(self.window)
-
-
-def _draw_opening(context: Any, size: tuple[int, int], text: str, scale: float) -> None:
-    """Fill a window's framebuffer, without shaders, which take a while to be compiled.
-
-    context: of moderngl. size: of the framebuffer in pixels. text: shown in the middle, cut to the width.
-    scale: pixels per point.
-    """
-    from PIL import Image, ImageDraw
-
-    picture = Image.new("RGBA", size, (*OPENING_GREY, 255))
-    pen, font = ImageDraw.Draw(picture), label_font(OPENING_TEXT_HEIGHT * scale)
-    line = shortened(pen, text, font, size[0] * 0.9)
-    pen.text((size[0] / 2, size[1] / 2), line, font=font, fill=OPENING_TEXT, anchor="mm")
-    texture = context.texture(size, 4, picture.transpose(Image.Transpose.FLIP_TOP_BOTTOM).tobytes())
-    filled = context.framebuffer([texture])
-    context.copy_framebuffer(context.screen, filled)
-    filled.release()
-    texture.release()
+        if size[0] < 1 or size[1] < 1:
+            return
+        page = opening_picture(size, self.scale, self.title, *self._step)
+        texture = self.gl.texture(size, 4, page.tobytes())
+        filled = self.gl.framebuffer([texture])
+        self.gl.copy_framebuffer(self.gl.screen, filled)
+        filled.release()
+        texture.release()
+        self.glfw.swap_buffers(self.window)

@@ -45,6 +45,7 @@ def test_written_streams_are_read_with_the_right_table(
     """With the mark nothing has to be given; without it, the reminder is a command that works."""
     shown = []
     monkeypatch.setattr(player, "play", lambda build, **_: shown.append(build().animation) or ())
+    monkeypatch.setattr(player.Surface, "open", lambda *_: None)
     source, target = files_with_a_body(tmp_path)["bap"], tmp_path / "my walk.fba"
     for arguments in (("encode", source, "-o", target), ("convert", source, target), ("gait", "-o", target)):
         assert run(*arguments, "--bap-steps", "visage").err == ""
@@ -198,6 +199,7 @@ def test_a_stream_of_iso_steps_read_as_visage(run: Run, tmp_path: Path) -> None:
 def test_the_window_is_told(run: Run, walk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {}
     monkeypatch.setattr(player, "play", lambda _, **options: given.update(options) or ())
+    monkeypatch.setattr(player.Surface, "open", lambda *_: None)
     done = run("play", walk, "--bap-steps", "iso")
     assert given["bap_steps"] == "iso"
     assert given["warnings"] == (done.err.removeprefix("fba: warning: ").strip(),)
@@ -224,6 +226,7 @@ def test_a_stream_that_arrives(run: Run, walk: Path, monkeypatch: pytest.MonkeyP
         return ()
 
     monkeypatch.setattr(player, "play", play)
+    monkeypatch.setattr(player.Surface, "open", lambda *_: None)
     pipe_in(monkeypatch, walk.read_bytes())
     assert run("play", "-", "--bap-steps", "iso").err.startswith(f"fba: warning: standard input: {WARNED}")
     pipe_in(monkeypatch, walk.read_bytes())

@@ -17,6 +17,8 @@ from studio_hand import panel_of
 
 graphics.imported("imgui_bundle")
 
+from fba_player._ui._docks import EDGE  # noqa: E402
+from fba_player._ui._hud import BUTTONS_HEIGHT  # noqa: E402
 from fba_player._ui.panels._differences_panel import DifferencesPanel, _shown, thin_curve  # noqa: E402 - needs imgui
 from studio_hand import StudioHand  # noqa: E402
 from tools.window_picture import Studio  # noqa: E402
@@ -118,3 +120,16 @@ def test_why_nothing_differs() -> None:
         (CompareScene([face, body]), "one is a face, the other a body"),
     ):
         assert _why_nothing_differs(scene, 1, scene.differences()).startswith(said)
+
+
+@pytest.mark.parametrize("size", [(900, 640), (1280, 720), (640, 400)])
+def test_names_stand_below_the_buttons_of_the_panels(studio: Studio, size: tuple[int, int]) -> None:
+    session = studio.session
+    session.size = size
+    session.viewpoint.aspect = size[0] / size[1]
+    studio.draw(4)
+    captions = session.scene.view_at(0.0).extras
+    assert captions is not None
+    at = captions.dots[-1].positions
+    clip = session.camera(0.0).clip_matrix(size) @ np.column_stack([at, np.ones(len(at))]).T
+    assert ((1 - clip[1] / clip[3]) / 2 * size[1] > EDGE + BUTTONS_HEIGHT + 9).all()  # half a name

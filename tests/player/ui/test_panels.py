@@ -432,3 +432,18 @@ def test_the_enlarged_timeline_follows_the_time_and_fits_again(speaking: Studio)
     assert zoom.shows(session.transport.time)
     act(session, "zoom_fit")
     assert zoom.shows_all
+
+
+@pytest.mark.parametrize("wide", [640, 760, 860, 900, 960, 1000, 1100, 1280, 2560])
+def test_the_speed_stands_beside_its_slider(studio: Studio, wide: int) -> None:
+    studio.session.size = (wide, 600)
+    studio.session.transport.set_speed(0.25)
+    studio.draw(2)
+    buttons = studio.gui.bar.buttons
+    left, right = buttons.slider
+    assert (right - left >= 60) == (wide >= 900)
+    assert (buttons.speed[1] > 0) == (wide >= 960)
+    if buttons.speed[1]:
+        assert buttons.taken[1] < buttons.speed[0] < buttons.speed[1] < left
+    elif right:
+        assert buttons.taken[1] < left

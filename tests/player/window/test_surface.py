@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,19 @@ import pytest
 import fba
 import graphics
 from fba.animation import Animation
+from fba.arrays import UInt8
+from fba.compiled import announce_compilation
 from fba.errors import DisplayError
 from fba_player.scene.scene import Scene
 from fba_player.session._memory import Memory
+from fba_player.session._session import Notice
 from fba_player.session._source import Source
+from fba_player.window._opening import ACCENT, opening_picture
 from fba_player.window._play import play
 from fba_player.window._window import Window
-from fba_player.window.surface import Surface
+from fba_player.window.surface import COMPILING, FUNCTIONS_TOLD, Surface
+
+SOUND = files("fba") / "samples" / "hello.wav"
 
 graphics.imported("glfw")
 graphics.imported("imgui_bundle")
@@ -113,8 +120,10 @@ def test_a_file_that_changes_is_shown_again_where_it_was(
     surface: Surface, talking: Animation, talk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fba_player.window._window.LOOK_SECONDS", 0.0)
+    monkeypatch.setattr("fba_player.sound._player.open_audio", lambda *_, **__: None)  # no sound device
 
     def edit(window: Window) -> None:
+        assert ["no sound device" in notice.text for notice in window.session.notices()] == [True]
         window.transport.seek(0.2)
         window.session.viewpoint.camera = window.session.viewpoint.camera.orbit(30, 0)
         window.session.open.add("view")
@@ -126,7 +135,7 @@ def test_a_file_that_changes_is_shown_again_where_it_was(
         raise AssertionError("it does not look")
 
     cameras = []
-    options = {"surface": surface, "file": talk, "paused": True}
+    options = {"surface": surface, "file": talk, "paused": True, "audio": SOUND}
     assert played(monkeypatch, fba.read(talk), edit, **options) == (talk,)
     state = surface.resumed
     assert state is not None
@@ -139,9 +148,19 @@ def test_a_file_that_changes_is_shown_again_where_it_was(
         assert not session.transport.playing
         assert "view" in session.open
         assert session.zoom.high - session.zoom.low == pytest.approx(0.18)
-        assert any("changed on disk" in notice.text for notice in session.notices())
+        assert ["changed on disk" in notice.text for notice in session.notices()] == [True]
+        assert not told_early  # a notice that begins before a slow first picture is not read
         close(window)
 
+    told_early: list[Notice] = []
+    update = Window.update
+
+    def first(window: Window) -> bool:
+        if not window.pictures:
+            told_early.extend(window.session.notices())
+        return update(window)
+
+    monkeypatch.setattr(Window, "update", first)
     assert played(monkeypatch, fba.read(talk), look, **options) == ()
     assert cameras == [state.view]
     assert surface.resumed is None
@@ -246,3 +265,40 @@ def test_from_the_face_it_stays_where_somebody_has_turned_it(walking: Animation)
     viewpoint.camera_without_panels(0.0)
     clock.now += 5
     assert viewpoint.camera.distance == pytest.approx(whole.distance)
+
+
+def test_the_opening_page_says_what_is_prepared_and_how_far(
+    surface: Surface, talking: Animation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[tuple[str, str, float]] = []
+
+    def picture(size: tuple[int, int], scale: float, name: str, step: str, done: float) -> UInt8:
+        told.append((name, step, done))
+        return opening_picture(size, scale, name, step, done)
+
+    def make() -> Scene:
+        for _ in range(FUNCTIONS_TOLD):
+            announce_compilation()
+        return Scene(talking)
+
+    monkeypatch.setattr("fba_player.window.surface.opening_picture", picture)
+    played(monkeypatch, make, lambda _: announce_compilation(), surface=surface, title="talk")
+    steps, shares = [step for _, step, _ in told], [share for *_, share in told]
+    assert {name for name, *_ in told} == {"talk"}
+    assert shares == sorted(shares)
+    assert len(set(steps)) == len(steps) >= 4
+    assert COMPILING.format(FUNCTIONS_TOLD) in steps  # not the one after the first picture
+    assert COMPILING.format(FUNCTIONS_TOLD + 1) not in steps
+
+
+@pytest.mark.parametrize(("size", "scale"), [((640, 480), 1.0), ((1280, 960), 2.0), ((90, 40), 1.0)])
+def test_the_opening_page_has_its_parts(size: tuple[int, int], scale: float) -> None:
+    half, whole = (
+        opening_picture(size, scale, "a name as long as nobody gives", "step", done) for done in (0.5, 1.0)
+    )
+    assert half.shape == whole.shape == (size[1], size[0], 4)
+    lit = [(page[..., :3] == ACCENT).all(axis=2).any(axis=0).sum() for page in (half, whole)]
+    assert lit[1] == pytest.approx(220 * scale if size[1] > 40 else 0, abs=2)
+    assert lit[0] == pytest.approx(lit[1] / 2, abs=2)
+    assert (half[-1, :, :3] == half[-1, ::-1, :3]).all()
+    assert half[-1].mean() > half[0].mean()  # lit from above
