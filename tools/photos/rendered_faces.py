@@ -29,7 +29,7 @@ VIEWS = 6
 """Pictures of each head."""
 HAIRY, BEARDED, FRINGED = 0.6, 0.3, 0.2
 """Shares of the pictures in which hair (the built-in head has no mesh of it), beard or fringe is painted."""
-OTHER_BROWS = 0.7
+OTHER_BROWS = 0.6
 """Share of the heads whose brows are painted on each picture, in another shape, place and colour."""
 MOVED = 0.45
 """Share of the pictures with a smile, which a mouth that is a little open often goes with."""
@@ -155,7 +155,6 @@ def _paint_brows(face: Float64, places: Float64, random: np.random.Generator) ->
     down = np.array([0.0, eyes])
     wide = random.uniform(0.06, 0.22) * eyes
     moves = random.normal(0, (0.06, 0.04, 0.05, 0.05))  # of all, of each point more
-    shorter = random.normal((0.03, 0.08), 0.06)  # the inner and the outer end, in lengths of the brow
     colour = random.uniform(0, 1.0) ** 2 * 170 * (1 + 0.2 * random.standard_normal(3))
     strength, blur = random.uniform(0.4, 1.0), random.uniform(0.4, 1.6)
     grain = np.clip(1 + random.uniform(0, 0.5) * _cloud(random, 1.0), 0, 1.2)
@@ -164,9 +163,8 @@ def _paint_brows(face: Float64, places: Float64, random: np.random.Generator) ->
         rows = [row[name] for name in names]
         own = random.normal(0, 0.015, (3, 2)) * eyes
         inner, top, tip = places[rows] + (moves[0] + moves[1:, None]) * down + own
-        inner, tip = inner + (tip - inner) * shorter[0], tip + (inner - tip) * shorter[1]
         along = np.linspace(0, 1, 24)[:, None]
-        shift = random.uniform(0.42, 0.78)  # where along the brow it is highest
+        shift = random.uniform(0.4, 0.65)  # where along the brow it is highest
         bend = inner + (tip - inner) * shift
         top = np.array([bend[0], min(top[1], inner[1] - 0.01 * eyes, tip[1] - 0.01 * eyes)])
         lift = top - bend

@@ -18,9 +18,9 @@ SPREADS = ((0.090, 0.006), (0.035, 0.004), (0.004, 0.002))
 """How faces differ: (length, metres, over which differences are alike; their usual size, metres)."""
 ASYMMETRY = 0.2
 """Differences between the two sides of a face, as a share of those between faces."""
-SKULL = {"11.1": 0.01, "11.4": 0.1, "11.6": 0.1}
-"""How much further, metres, up or down and to the front or back, points of hairline and skull usually are: an
-even outline does not tell where on it they belong, and the depth of the head must not follow them."""
+SKULL = {"11.1": 0.01, "11.4": 0.02, "11.6": 0.02}
+"""How much further, metres, up or down and to the front or back, points of hairline and skull usually are from
+those of another head: hair is between nothing and some centimetres thick, and does not say how deep a face is."""
 ROUNDS = 25
 TURN_STEP = 0.17
 """Usual turn of a camera in a round, radians: a profile of the middle alone hardly shows it."""
