@@ -29,7 +29,8 @@ LASHES = 4.0
 BLACK = 0.03
 """Brightness that is added before logarithms are taken: dark noise is no brow."""
 HUE = 0.5
-"""How much more another colour than the skin's counts than darkness: brows may be as bright, but are not as red."""
+"""How much another colour than the skin's counts beside darkness: brows may be as bright, but are not as red.
+Chosen like `TRUST`."""
 STEP = 0.06
 """What a pixel up or down from column to column costs, in shares of the strongest ridge."""
 FAINT = 0.4
@@ -77,7 +78,7 @@ def follow_brows(face: Float64, places: Float64) -> Float64:
 
 
 def _skin_likeness(colours: Float64) -> Float64:
-    """Return how bright and how like the skin places (..) are, from the logarithms (3, ...) of their colours."""
+    """Return how bright and like the skin places (...) are, from the logarithms (3, ...) of their colours."""
     shades = colours[::2] - colours[1]
     usual = np.median(shades, axis=(1, 2), keepdims=True)
     return np.asarray(np.tensordot(LUMINANCE, colours, 1) - HUE * np.linalg.norm(shades - usual, axis=0))
