@@ -33,6 +33,8 @@ REACHES = (4.0, 2.0)
 """Pixels over which gradients are summed, coarse and fine."""
 STAGES = (0, 0, 1, 1, 1)
 """Reach, as a number in `REACHES`, of each regression of the cascade."""
+LUMINANCE = np.array([0.299, 0.587, 0.114])
+"""Shares of red, green and blue in brightness."""
 CELLS = 4
 """Sums of gradients along each side of a square around a point."""
 
@@ -114,7 +116,7 @@ def standard_frame(places: Float64, mean: Float64) -> tuple[Float64, Float64]:
 
 def luminance(pixels: UInt8) -> Float64:
     """Return the brightness (H, W), 0 to 1, of a picture (H, W, 3), as its file stores it."""
-    return np.asarray(pixels @ np.array([0.299, 0.587, 0.114]) / 255)
+    return np.asarray(pixels @ LUMINANCE / 255)
 
 
 def standard_face(grey: Float64, middle: Float64, across: Float64) -> Float64:

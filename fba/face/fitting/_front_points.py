@@ -82,7 +82,8 @@ def find_front_points(photograph: Photograph) -> FoundPoints:
     at, spread = _found_again(grey, middle, across)
     middle, across = standard_frame(at, features().mean)
     face = standard_face(grey, middle, across)
-    places = follow_brows(face, _with_pupils(face, to_standard(at, middle, across)))
+    colours = np.stack([standard_face(photograph.pixels[..., k] / 255, middle, across) for k in range(3)])
+    places = follow_brows(colours, _with_pupils(face, to_standard(at, middle, across)))
     steps.append(
         Step("The middle of ten tries; pupils and brows by their brightness", _draw(face, None, places))
     )

@@ -18,7 +18,7 @@ from fba.face.fitting._measures import Measure, measure
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS, HIDDEN, SIDE_POINTS, Points, check_inside
 from fba.face.fitting._skin import paint
-from fba.face.fitting._views import Observation, View, first_view, fit_views, solve
+from fba.face.fitting._views import SKULL, Observation, View, first_view, fit_views, solve
 from fba.geometry import fit_similarity
 from fba.parameters import point_rows
 
@@ -144,6 +144,7 @@ def _with_brows(points: Float64, usual: Float64) -> Float64:
     """
     brows = [point_rows()[name] for side in BROWS for name in side]
     known = np.asarray(np.isfinite(points + usual).all(axis=1))
+    known[[point_rows()[name] for name in SKULL]] = False  # these are no place of their own
     if known[brows].any():
         return points
     result = points.copy()

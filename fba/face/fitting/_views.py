@@ -9,6 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64, Floating
 from fba.capture.points.poses import fit_poses
+from fba.parameters import point_rows
 from fba.rotations import turn as rotation_about
 
 NOISE = 0.0004
@@ -17,6 +18,9 @@ SPREADS = ((0.090, 0.006), (0.035, 0.004), (0.004, 0.002))
 """How faces differ: (length, metres, over which differences are alike; their usual size, metres)."""
 ASYMMETRY = 0.2
 """Differences between the two sides of a face, as a share of those between faces."""
+SKULL = {"11.1": 0.01, "11.4": 0.02, "11.6": 0.02}
+"""How much further, metres, up or down and forwards or backwards, points of hairline and skull usually are
+from those of another head: hair may be some centimetres thick, and does not say how deep a face is."""
 ROUNDS = 25
 TURN_STEP = 0.17
 """Usual turn of a camera in a round, radians: a profile of the middle alone hardly shows it."""
@@ -112,7 +116,7 @@ def solve(
     number = {row: k for k, row in enumerate(rows)}
     base = template[rows]
     size = 0 if rigid else 3 * len(rows)
-    prior = np.zeros((0, 0)) if rigid else np.linalg.inv(face_covariance(base))
+    prior = np.zeros((0, 0)) if rigid else np.linalg.inv(_covariance(template, rows, len(views) > 1))
     moved = np.zeros((len(rows), 3))
     views = list(views)
     count = size + 6 * len(views)
@@ -153,6 +157,17 @@ def solve(
     points = np.full_like(template, np.nan)
     points[rows] = base + moved
     return points, views
+
+
+def _covariance(template: Float64, rows: list[int], deep: bool) -> Float64:
+    """Return (3K, 3K): how some points of one head differ from another's, square metres.
+
+    deep: whether several views show depth, which `SKULL` must not change.
+    """
+    more = np.zeros((len(rows), 3))
+    for name, usual in SKULL.items() if deep else ():
+        more[np.array(rows) == point_rows()[name], 1:] = usual**2
+    return face_covariance(template[rows]) + np.diag(more.ravel())
 
 
 def _turned(rotation: Float64, vector: Float64) -> Float64:

@@ -13,21 +13,28 @@ from fba.face.fitting._points_file import FRONT_POINTS
 ROWS = [[FRONT_POINTS.index(name) for name in names] for names in BROWS]
 
 
-def drawn(places: np.ndarray, aside: float) -> np.ndarray:
-    """A grey face with two dark lines where brows are, moved to the side by some pixels."""
-    face = np.full(FACE_SIZE, 0.7)
+SKIN, DARK, VIOLET = (0.8, 0.6, 0.5), (0.2, 0.15, 0.12), (0.68, 0.6, 0.8)
+"""Violet is as bright as the skin."""
+
+
+def drawn(places: np.ndarray, aside: float, colour: tuple[float, float, float]) -> np.ndarray:
+    """A face (3, H, W) with two lines where brows are, moved to the side by some pixels."""
+    share = np.zeros(FACE_SIZE)
     for inner, top, outer in ROWS:
         bow = np.polyfit(places[[inner, top, outer], 0], places[[inner, top, outer], 1], 2)
         for x in np.linspace(places[inner, 0], places[outer, 0], 200):
             y = np.polyval(bow, x) + USUAL
-            face[int(y) - 2 : int(y) + 3, round(x + aside)] = 0.2
-    return gaussian_filter(face, 0.7)
+            share[int(y) - 2 : int(y) + 3, round(x + aside)] = 1
+    skin, brow = (np.array(one)[:, None, None] for one in (SKIN, colour))
+    return np.asarray(skin + (brow - skin) * gaussian_filter(share, 0.7))
 
 
-@pytest.mark.parametrize("aside", [-5.0, 0.0, 5.0])
-def test_ends_go_part_of_the_way_to_where_a_brow_ends(aside: float) -> None:
+@pytest.mark.parametrize(("aside", "colour"), [(-5.0, DARK), (0.0, DARK), (5.0, DARK), (5.0, VIOLET)])
+def test_ends_go_part_of_the_way_to_where_a_brow_ends(
+    aside: float, colour: tuple[float, float, float]
+) -> None:
     places = features().mean
-    found = follow_brows(drawn(places, aside), places)
+    found = follow_brows(drawn(places, aside, colour), places)
     for inner, _, outer in ROWS:
         for row, trust in ((inner, TRUST[0, 0]), (outer, TRUST[2, 0])):
             assert found[row, 0] - places[row, 0] == pytest.approx(trust * aside, abs=trust * 3)
@@ -37,4 +44,4 @@ def test_ends_go_part_of_the_way_to_where_a_brow_ends(aside: float) -> None:
 
 def test_a_face_without_brows_keeps_its_points() -> None:
     places = features().mean
-    np.testing.assert_array_equal(follow_brows(np.full(FACE_SIZE, 0.7), places), places)
+    np.testing.assert_array_equal(follow_brows(np.full((3, *FACE_SIZE), 0.7), places), places)

@@ -99,6 +99,19 @@ def test_two_views_show_a_head_s_depth(side: float) -> None:
     assert abs(views[1].degrees[0]) == pytest.approx(82, abs=6)
 
 
+@pytest.mark.parametrize("seed", [4, 5])
+def test_hair_on_the_skull_changes_little_of_the_face_s_depth(seed: int) -> None:
+    haired, bald = other_head(seed), other_head(seed)
+    bald[[point_rows()["11.4"], point_rows()["11.6"]]] += [(0, -0.018, 0), (0, -0.012, 0.013)]
+    rows, found = [point_rows()[name] for name in FRONT_POINTS], []
+    for points in (haired, bald):
+        seen = [observe(camera(7, 4), points, FRONT_POINTS), observe(camera(82, -3), points, SIDE_POINTS)]
+        first = [first_view(BASE, seen[0], 1.5), first_view(BASE, seen[1], 1.5, side=1.0)]
+        shape = solve(BASE, fit_views(BASE, first, seen), seen)[0]
+        found.append(fit_similarity(shape[rows], haired[rows]).apply(shape[rows]))
+    assert np.linalg.norm(found[0] - found[1], axis=1).mean() < 0.00025
+
+
 def test_a_wrong_point_moves_the_others_little() -> None:
     points = other_head(5)
     seen = observe(camera(0, 0), points, FRONT_POINTS)
