@@ -125,12 +125,12 @@ def _view_points(content: Any, where: str) -> dict[str, tuple[float, float]]:
 
 def _landmarks(path: str | os.PathLike[str], size: tuple[int, int] | None) -> dict[str, tuple[float, float]]:
     """Return the feature points among a landmark program's points in the first frame with a face."""
-    motion = read_face(os.fspath(path), format="points", source_rate=30)
+    motion = read_face(os.fspath(path), format="points", source_rate=30, pixels=True)
     frames = np.flatnonzero(motion.seen)
     if not len(frames):
         raise ModelError(f"{path}: no face was seen; there are no points to take")
     if motion.metric:
-        raise ModelError(f"{path}: its points are in metres, and the photograph's pixels are needed")
+        raise ModelError(f"{path}: its points are in millimetres, and the photograph's pixels are needed")
     plane: Float64 = motion.positions[frames[0], :, :2]
     if motion.share:
         if size is None:

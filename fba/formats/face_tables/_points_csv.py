@@ -68,27 +68,33 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_points(
-    path: Path, *, source_rate: Rate | None = None, face: str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path,
+    *,
+    source_rate: Rate | None = None,
+    face: str | None = None,
+    pixels: bool = False,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> PointMotion:
     """Return the points as they are in a table.
 
     source_rate: frames per second, for tables without times. face: the name or number of the face to read, if
-    there are several. Raises FormatError, LimitError.
+    there are several. pixels: take these, not millimetres, from a table with both. Raises FormatError,
+    LimitError.
     """
     table = _with_header(read_table(path, limits))
     column = table.columns
     by_word = {name.lower(): number for name, number in column.items()}
     long = _long_columns(table.names)
+    metric = long is None and _is_metric(table.names, pixels)
     ids = next((table.column(column[name]) for name in FACES if name in column), [""] * len(table.rows))
     rows = choose_rows(table, ids, face)
     if long is not None:
         positions, first = _read_long(table, rows, long)
     else:
-        positions, first = _read_wide(table, rows), rows
+        positions, first = _read_wide(table, rows, metric), rows
     seconds = next((by_word[name] for name in (*TIMES, *MILLISECONDS) if name in by_word), None)
     frame = next((by_word[name] for name in FRAMES if name in by_word), None)
     times, rate, odd = row_times(table, first, seconds, frame, source_rate)
-    metric = long is None and _is_metric(table.names)
     positions[~tracked_rows(table)[first]] = np.nan
     return build_points(
         positions * (MILLIMETRE if metric else 1.0), times, rate, path=path,
@@ -133,13 +139,14 @@ def _with_header(table: Table) -> Table:
     return replace(table, names=tuple(names), rows=rows, lines=[table.lines[0] - 1, *table.lines])
 
 
-def _is_metric(names: Sequence[str]) -> bool:
-    """Whether columns are OpenFace's points in millimetres, X_0, Y_0, Z_0."""
-    return {"X", "Y", "Z"} <= set(_find_sets(names).get("", {}))
+def _is_metric(names: Sequence[str], pixels: bool) -> bool:
+    """Whether to take OpenFace's points in millimetres, X_0, Y_0, Z_0. pixels: not beside x_0, y_0."""
+    axes = set(_find_sets(names).get("", {}))
+    return {"X", "Y", "Z"} <= axes and not (pixels and {"x", "y"} <= axes)
 
 
-def _read_wide(table: Table, rows: Int64) -> Float64:
-    """Return points (T, N, 2 or 3) of a table with a column for each coordinate."""
+def _read_wide(table: Table, rows: Int64, metric: bool) -> Float64:
+    """Return points (T, N, 2 or 3) of a table with a column for each coordinate. metric: of `_is_metric`."""
     if (plain := _plain_columns(table.names)) is not None:
         count = len(plain)
         width = 3 if count % 3 == 0 and count // 3 in PointMotion.COUNTS else 2
@@ -150,7 +157,7 @@ def _read_wide(table: Table, rows: Int64) -> Float64:
             "no columns of points, such as x_0, y_0, z_0, x_1, ...", path=table.path, line=table.lines[0] - 1
         )
     chosen = max(sets.values(), key=lambda axes: max(len(numbers) for numbers in axes.values()))
-    axes = "XYZ" if {"X", "Y", "Z"} <= set(chosen) else "xyz" if {"x", "y"} <= set(chosen) else "XYZ"
+    axes = "xyz" if {"x", "y"} <= set(chosen) and not metric else "XYZ"
     if not set(axes[:2]) <= set(chosen):
         raise FormatError("has no columns of both x and y of its points", path=table.path, line=1)
     numbers = sorted(chosen[axes[0]])

@@ -19,14 +19,22 @@ def sniff(head: bytes, suffix: str) -> bool:
 
 
 def read_points(
-    path: Path, *, source_rate: Rate | None = None, face: str | None = None, limits: Limits = DEFAULT_LIMITS
+    path: Path,
+    *,
+    source_rate: Rate | None = None,
+    face: str | None = None,
+    pixels: bool = False,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> PointMotion:
     """Return the points as they are in a file.
 
     source_rate: frames per second, for files without times. face: the name or number of the face to read, if
-    there are several. Raises FormatError, LimitError.
+    there are several. pixels: take these, not millimetres, from a table with both. Raises FormatError,
+    LimitError.
     """
     head = read_head(path)
-    reader = next((each for each in READERS if each.sniff(head, "")), points_csv)
-    motion: PointMotion = reader.read_points(path, source_rate=source_rate, face=face, limits=limits)
-    return motion
+    if points_arrays.sniff(head, ""):
+        return points_arrays.read_points(path, source_rate=source_rate, face=face, limits=limits)
+    if points_json.sniff(head, ""):
+        return points_json.read_points(path, source_rate=source_rate, face=face, limits=limits)
+    return points_csv.read_points(path, source_rate=source_rate, face=face, pixels=pixels, limits=limits)

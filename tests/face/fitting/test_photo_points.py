@@ -74,11 +74,15 @@ def test_mediapipe_s_shares_become_pixels(tmp_path: Path) -> None:
         read_photo_points(tmp_path / "mediapipe.json")
 
 
-def test_openface_s_table_is_read(tmp_path: Path) -> None:
-    at = np.array(landmarks(68))
+@pytest.mark.parametrize("metric", [False, True])
+def test_openface_s_pixels_are_read(metric: bool, tmp_path: Path) -> None:
+    at, space = np.array(landmarks(68)), np.ones((68, 3)) * np.arange(68)[:, None]
     titles = ["frame", "face_id", "timestamp", "confidence", "success"]
     titles += [f"x_{k}" for k in range(68)] + [f"y_{k}" for k in range(68)]
     row = [1, 0, 0.0, 0.98, 1, *at[:, 0], *at[:, 1]]
+    if metric:
+        titles += [f"{axis}_{k}" for axis in "XYZ" for k in range(68)]
+        row += space.T.ravel().tolist()
     (tmp_path / "openface.csv").write_text(", ".join(titles) + "\n" + ", ".join(map(str, row)) + "\n")
     front = read_photo_points(tmp_path / "openface.csv", (600, 800))["front"]
     assert front["8.1"] == pytest.approx(at[51])
