@@ -35,17 +35,12 @@ NECK = ("Neck1", "Neck2")
 ARM = ("shoulder", "elbow", "wrist", "thumb", *FINGERS)
 HEAD = ("Head", "HeadEnd", "Jaw", "LeftEye", "RightEye")
 
-CAP = (-0.13, 0.035)
+CAP = (-0.11, 0.05)
 """Heights from the joint over which moving in the cap fades in, metres."""
-LEFT = 0.67
+LEFT = 0.45
 """Share that remains of its distance beyond SIDE, at the upper of these heights."""
 SIDE = -0.010
 """Metres out from the joint from which that distance is measured."""
-DROP, DROPPED = 0.018, (0.02, 0.055)
-"""Metres by which the end of the shoulder is lowered, from how far within the joint outwards, and over which
-distance that begins."""
-COLLAR = 0.085
-"""Metres from the midline within which it stays: the neck, which a head brings, goes under a collar there."""
 STRAIGHT = (0.13, 0.80)
 """Heights between which the outline of a leg is evened out, metres."""
 EVEN, ROUND = 0.13, 0.16
@@ -173,12 +168,9 @@ def shape_for_standing(person: Person, bones: Rig) -> Person:
     shift = np.zeros_like(positions)
     for side, sign in (("l", 1.0), ("r", -1.0)):
         joint = bones.centres[bones.names.index(f"{side}_shoulder")]
-        out = sign * (positions[:, 0] - joint[0])
+        out = sign * (positions[:, 0] - joint[0]) - SIDE
         high = smoothstep((positions[:, 1] - joint[1] - CAP[0]) / (CAP[1] - CAP[0]))
-        shift[:, 0] -= sign * np.maximum(out - SIDE, 0.0) * (1 - LEFT) * high
-        end = np.exp(-((np.minimum(out + DROPPED[0], 0.0) / DROPPED[1]) ** 2))
-        end *= smoothstep((np.abs(positions[:, 0]) - COLLAR) / 0.05)
-        shift[:, 1] -= DROP * end * smoothstep((positions[:, 1] - joint[1] + 0.01) / 0.06)
+        shift[:, 0] -= sign * np.maximum(out, 0.0) * (1 - LEFT) * high
         knee = bones.centres[bones.names.index(f"{side}_knee")]
         mine = (sign * positions[:, 0] > 0) & (person.arms < 0.5) & (positions[:, 1] < STRAIGHT[1])
         shift[mine] += _straighten(positions[mine] - (knee[0], 0.0, knee[2]))
