@@ -115,16 +115,22 @@ def play(
         if resumed is not None:
             _resume(session, resumed)
             paused = not resumed.playing
-        surface.tell("Drawing the first picture", 0.75)
-        shown = window.update()
-        surface.show_scene()
-        if resumed is not None:  # said now, as preparing may take longer than notices are shown
-            session.say(f"{source.name} has changed on disk, and is shown again", about="reload")
-        if shown and not paused:  # the first picture takes long: time begins when it is there
-            window.transport.play()
-        window.run()
-        surface.resumed = _state(session) if session.resumes else None
-        return session.dropped
+        return _run(window, surface, paused=paused)
+
+
+def _run(window: Window, surface: Surface, *, paused: bool) -> tuple[Path, ...]:
+    """Show a prepared window until it is closed; return the files dropped onto it."""
+    session = window.session
+    surface.tell("Drawing the first picture", 0.75)
+    shown = window.update()
+    surface.show_scene()
+    if surface.resumed is not None:  # said now, as preparing may take longer than notices are shown
+        session.say(f"{session.source.name} has changed on disk, and is shown again", about="reload")
+    if shown and not paused:  # the first picture takes long: time begins when it is there
+        window.transport.play()
+    window.run()
+    surface.resumed = _state(session) if session.resumes else None
+    return session.dropped
 
 
 def _set_up(
