@@ -63,6 +63,8 @@ TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""
 HAIRS = ("lash", "brow")
 """Kinds of parts that do not count in a level's error."""
+HAIR_SHARE = 0.1
+"""The same for hair."""
 OTHER_SHARE = 0.2
 """The same for clothes and what else is worn."""
 RIM_VERTICES = 16
@@ -245,6 +247,7 @@ def _importance(model: FaceModel) -> Float64:
         ("lash", LASH_SHARE),
         ("teeth", TEETH_SHARE),
         ("tongue", TONGUE_SHARE),
+        ("hair", HAIR_SHARE),
         ("other", OTHER_SHARE),
     ):
         for part in model.of_kind(kind):
