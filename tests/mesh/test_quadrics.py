@@ -106,24 +106,15 @@ def test_what_moves_in_a_pose_keeps_its_vertices() -> None:
     assert (moving == 1).sum() > 2 * (flat == 1).sum()
 
 
-@pytest.mark.parametrize(("copies", "kept"), [(2, 1 / 3), (3, 1.0)])
-def test_a_seam_does_not_gape(copies: int, kept: float) -> None:
-    """Squares that meet in one edge, each with vertices of its own: two go along it together, more stay."""
+def test_a_seam_does_not_gape() -> None:
+    """Two squares side by side whose vertices along the seam are there twice."""
     left, triangles = grid(11, 0.05)
-    turns = np.linspace(0, 2 * np.pi, copies, endpoint=False)
-    sheets = [left @ [[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [0, 0, 1]] for turn in turns]
-    vertices = np.concatenate(sheets)
-    both = np.concatenate([triangles + number * len(left) for number in range(copies)]).astype(np.int32)
-    onto, first = simplify_by_quadrics(vertices, 1, both, (0.001, 0.002))
-    seam = np.arange(11) * 11 + np.arange(copies)[:, None] * len(left)
-    np.testing.assert_array_equal(first[seam], np.tile(first[seam[0]], (copies, 1)))
-    np.testing.assert_allclose(
-        vertices[onto[seam]], np.tile(vertices[onto[seam[0]]], (copies, 1, 1)), atol=1e-12
-    )
-    assert (first[seam] == 2).mean() <= kept
-    found = DetailLevels(vertices.astype(np.float32), 1, both).triangles_within(0.0016)
-    assert found is not None
-    assert area(vertices, found) == pytest.approx(copies * 0.05**2, rel=1e-6)
+    right = left + np.array([0.05, 0.0, 0.0])
+    vertices = np.concatenate([left, right])
+    both = np.concatenate([triangles, triangles + len(left)]).astype(np.int32)
+    onto, _ = simplify_by_quadrics(vertices, 1, both, (0.001,))
+    seam = np.flatnonzero(np.abs(vertices[:, 0] - 0.05) < 1e-9)
+    assert (onto[seam] == seam).all()
 
 
 def test_a_file_that_was_tampered_with_is_made_anew(tmp_path: Path) -> None:

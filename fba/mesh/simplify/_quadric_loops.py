@@ -46,17 +46,11 @@ class Quadrics(NamedTuple):
 
 
 class Fixed(NamedTuple):
-    """What keeps vertices: border, locked, bool (V,), and the largest squared error.
-
-    place: (V,), equal for vertices in the same place. twin: (V,), the other vertex of two in one place, as
-    along the seam of a texture, which must not gape: they move together; -1 for none.
-    """
+    """What keeps vertices: border, locked, bool (V,), and the largest squared error."""
 
     border: Bool
     locked: Bool
     limit: float
-    place: Int32
-    twin: Int32
 
 
 @compiled
@@ -226,45 +220,17 @@ def _find_neighbours(fans: Fans, u: int, near: Int32, shared: Int32) -> int:
 
 
 @compiled
-def _error(points: Float64, sums: Quadrics, u: int, v: int) -> float:
-    """Return the sum of squared distances that u has moved from its planes, by weight, when it goes to v."""
+def _squared_error(points: Float64, sums: Quadrics, u: int, v: int) -> float:
+    """Return the mean squared distance that u has moved from its planes when it goes to v."""
     x, n = points[v], points.shape[1]
-    error: float = sums.c[u]
+    error = sums.c[u]
     for j in range(n):
         row = 2.0 * sums.b[u, j]
         for k in range(n):
             row += sums.a[u, j, k] * x[k]
         error += row * x[j]
-    return error
-
-
-@compiled
-def _may_go(points: Float64, poses: int, fans: Fans, border: Bool, u: int, v: int) -> bool:
-    """Return whether u may go to its neighbour v.
-
-    Bounds: at most MAX_TRIANGLES_AROUND triangles with two corners each besides the vertex are near it.
-    """
-    near = np.empty(2 * MAX_TRIANGLES_AROUND, dtype=np.int32)
-    shared = np.empty(2 * MAX_TRIANGLES_AROUND, dtype=np.int32)
-    together = _count_triangles(fans, u, v)
-    if together > 2 or (border[u] and (together != 1 or not border[v])):
-        return False
-    joint = 0  # common neighbours of the ends: more than triangles at the edge make it non-manifold
-    for k in range(_find_neighbours(fans, u, near, shared)):
-        if near[k] != v and _count_triangles(fans, v, near[k]) > 0:
-            joint += 1
-    return joint == together and _fits(points, poses, fans, u, v)
-
-
-@inlined
-def _neighbour_at(fans: Fans, places: Int32, u: int, place: int) -> int:
-    """Return the neighbour of u in this place, or -1."""
-    for o in range(fans.start[u], fans.start[u + 1]):
-        for k in range(3):
-            v = fans.triangles[fans.owners[o], k]
-            if v != u and places[v] == place:
-                return int(v)
-    return -1
+    mean: float = error / max(sums.w[u], 1e-30)
+    return mean
 
 
 @compiled
@@ -272,88 +238,72 @@ def candidates(
     points: Float64, poses: int, fans: Fans, fixed: Fixed, sums: Quadrics, goal: Int32, cost: Float64
 ) -> int:
     """Write the neighbour that each vertex is best collapsed onto, or -1, and the squared error; return how
-    many vertices have one. Of twins, both have goals in one place, or none."""
+    many vertices have one.
+
+    Bounds: at most MAX_TRIANGLES_AROUND triangles with two corners each besides the vertex are near it.
+    """
     near = np.empty(2 * MAX_TRIANGLES_AROUND, dtype=np.int32)
     shared = np.empty(2 * MAX_TRIANGLES_AROUND, dtype=np.int32)
     count_with_goal = 0
-    goal[:] = -1
     for u in range(len(points)):
-        w = fixed.twin[u]
-        if fixed.locked[u] or 0 <= w < u:
-            continue
+        goal[u] = -1
         around_u = fans.start[u + 1] - fans.start[u]
-        around_w = fans.start[w + 1] - fans.start[w] if w >= 0 else 1
-        if min(around_u, around_w) == 0 or max(around_u, around_w) > MAX_TRIANGLES_AROUND:
+        if fixed.locked[u] or around_u == 0 or around_u > MAX_TRIANGLES_AROUND:
             continue
-        best, weight = fixed.limit, sums.w[u] + (sums.w[w] if w >= 0 else 0.0)
-        for i in range(_find_neighbours(fans, u, near, shared)):
-            v, x = near[i], -1
-            error = _error(points, sums, u, v)
-            if w >= 0:
-                x = _neighbour_at(fans, fixed.place, w, fixed.place[v])
-                if x < 0 or fixed.place[v] == fixed.place[u]:
-                    continue
-                error += _error(points, sums, w, x)
-            error /= max(weight, 1e-30)
-            if not error < best or not _may_go(points, poses, fans, fixed.border, u, v):
+        count = _find_neighbours(fans, u, near, shared)
+        best = fixed.limit
+        for i in range(count):
+            v = near[i]
+            if shared[i] > 2 or (fixed.border[u] and (shared[i] != 1 or not fixed.border[v])):
                 continue
-            if w >= 0:
-                if not _may_go(points, poses, fans, fixed.border, w, x):
-                    continue
-                goal[w], cost[w] = x, error
-            best, goal[u], cost[u] = error, v, error
-        count_with_goal += goal[u] >= 0
+            error = _squared_error(points, sums, u, v)
+            if not error < best:
+                continue
+            joint = 0  # common neighbours of the ends: more than triangles at the edge make it non-manifold
+            for k in range(count):
+                if near[k] != v and _count_triangles(fans, v, near[k]) > 0:
+                    joint += 1
+            if joint != shared[i] or not _fits(points, poses, fans, u, v):
+                continue
+            best = error
+            goal[u] = v
+        if goal[u] >= 0:
+            cost[u] = best
+            count_with_goal += 1
     return count_with_goal
 
 
 @compiled
-def collapse(
-    order: Int64, goal: Int32, twin: Int32, fans: Fans, touched: Bool, onto: Int32, sums: Quadrics
-) -> int:
+def collapse(order: Int64, goal: Int32, fans: Fans, touched: Bool, onto: Int32, sums: Quadrics) -> int:
     """Collapse vertices onto their goals in this order, none next to another; return how many.
 
-    Twins collapse together. Triangles that lose their area keep two equal corners. onto: (V,), written: what
-    each vertex collapsed to.
+    Triangles that lose their area keep two equal corners. onto: (V,), written: what each vertex collapsed to.
     """
+    triangles, start, owners = fans
+    a, b, c, w = sums
     touched[:] = False
     done = 0
     for u in order:
-        w = twin[u]
-        if _is_touched(fans, touched, u, goal[u]) or (w >= 0 and _is_touched(fans, touched, w, goal[w])):
+        v = goal[u]
+        free = not touched[v]
+        for o in range(start[u], start[u + 1]):
+            for k in range(3):
+                free = free and not touched[triangles[owners[o], k]]
+        if not free:
             continue
-        _move(fans, touched, sums, u, goal[u])
-        onto[u] = goal[u]
-        if w >= 0:
-            _move(fans, touched, sums, w, goal[w])
-            onto[w] = goal[w]
+        for o in range(start[u], start[u + 1]):
+            for k in range(3):
+                touched[triangles[owners[o], k]] = True
+        for o in range(start[u], start[u + 1]):
+            for k in range(3):
+                if triangles[owners[o], k] == u:
+                    triangles[owners[o], k] = v
+        for i in range(a.shape[1]):
+            for j in range(a.shape[1]):
+                a[v, i, j] += a[u, i, j]
+            b[v, i] += b[u, i]
+        c[v] += c[u]
+        w[v] += w[u]
+        onto[u] = v
         done += 1
     return done
-
-
-@compiled
-def _is_touched(fans: Fans, touched: Bool, u: int, v: int) -> bool:
-    """Return whether v or a corner of the triangles around u is touched."""
-    found = bool(touched[v])
-    for o in range(fans.start[u], fans.start[u + 1]):
-        for k in range(3):
-            found = found or bool(touched[fans.triangles[fans.owners[o], k]])
-    return found
-
-
-@compiled
-def _move(fans: Fans, touched: Bool, sums: Quadrics, u: int, v: int) -> None:
-    """Replace u by v in its triangles, whose corners are touched, and add its quadric to that of v."""
-    a, b, c, w = sums
-    for o in range(fans.start[u], fans.start[u + 1]):
-        for k in range(3):
-            touched[fans.triangles[fans.owners[o], k]] = True
-    for o in range(fans.start[u], fans.start[u + 1]):
-        for k in range(3):
-            if fans.triangles[fans.owners[o], k] == u:
-                fans.triangles[fans.owners[o], k] = v
-    for i in range(a.shape[1]):
-        for j in range(a.shape[1]):
-            a[v, i, j] += a[u, i, j]
-        b[v, i] += b[u, i]
-    c[v] += c[u]
-    w[v] += w[u]

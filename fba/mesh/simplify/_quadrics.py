@@ -19,7 +19,7 @@ MIN_TRIANGLES = 200
 MAX_PASSES = 40
 MIN_REMOVED_SHARE = 0.004
 """A pass that removes less than this share of the vertices is the last one of its level."""
-CACHE_VERSION = "4"
+CACHE_VERSION = "3"
 """Cache version; increment when `simplify_by_quadrics` gives other results."""
 
 
@@ -74,8 +74,7 @@ def simplify_by_quadrics(
     """Return the vertex that each vertex collapses onto, and the level at which it does: int32 (V,) twice.
 
     The level is an index into tolerances (m, rising), or their number for a vertex that stays. points, poses,
-    triangles: as in `DetailLevels`. Borders keep their course; two vertices that share a position
-    go on sharing one, and more than two stay.
+    triangles: as in `DetailLevels`. Borders keep their course; vertices that share a position stay.
     ValueError for triangles that name other vertices, and for more poses than the points hold.
     """
     from fba.mesh.simplify import _quadric_loops as loops
@@ -95,19 +94,19 @@ def simplify_by_quadrics(
     a, b = np.zeros((count, size, size)), np.zeros((count, size))
     sums = loops.Quadrics(a, b, c=np.zeros(count), w=np.zeros(count))
     loops.add_quadrics(points, fans, sums)
-    place, twin, locked = _find_twins(points[:, :3])
+    locked = _share_positions(points[:, :3])
     goal, cost = np.empty(count, dtype=np.int32), np.empty(count)
     touched = np.empty(count, dtype=bool)
     onto = np.arange(count, dtype=np.int32)
     first = np.full(count, len(tolerances), dtype=np.int32)
     for level, tolerance in enumerate(tolerances):
-        fixed = loops.Fixed(border, locked, tolerance**2, place, twin)
+        fixed = loops.Fixed(border, locked, tolerance**2)
         for _ in range(MAX_PASSES):
             if not loops.candidates(points, poses, fans, fixed, sums, goal, cost):
                 break
             movable = np.flatnonzero(goal >= 0)
             order = movable[np.argsort(cost[movable], kind="stable")]
-            done = loops.collapse(order, goal, twin, fans, touched, onto, sums)
+            done = loops.collapse(order, goal, fans, touched, onto, sums)
             first[(onto != np.arange(count)) & (first == len(tolerances))] = level
             fans = loops.Fans(_without_flat(fans.triangles), start, owners)
             loops.around(fans.triangles, count, start, owners)
@@ -122,14 +121,8 @@ def _without_flat(triangles: Int32) -> Int32:
     return np.ascontiguousarray(triangles[(a != b) & (b != c) & (c != a)])
 
 
-def _find_twins(positions: Float64) -> tuple[Int32, Int32, Bool]:
-    """Return (V,) numbers of places; the other vertex where two share one, as along a seam, which would gape,
-    else -1; and whether more than two do."""
+def _share_positions(positions: Float64) -> Bool:
+    """Return bool (V,): whether another vertex has the same position, as along a seam, which would gape."""
     rounded = np.ascontiguousarray(np.round(positions * 1e6).astype(np.int64))
-    _, places, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
-    place = places.ravel().astype(np.int32)
-    order = np.argsort(place, kind="stable")
-    pairs = order[counts[place[order]] == 2].reshape(-1, 2)
-    twin = np.full(len(positions), -1, dtype=np.int32)
-    twin[pairs] = pairs[:, ::-1]
-    return place, twin, np.asarray(counts[place] > 2)
+    _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
+    return np.asarray(counts[inverse.ravel()] > 1)
