@@ -28,8 +28,10 @@ from fba_player.web._container import Container, rounded
 from fba_player.web._look_packing import pack_face_light, pack_wrinkles
 
 STEP = 1e-5
-"""Metres: positions and shapes are multiples of it."""
-SHAPE_ERROR = 1.5e-5
+"""Metres: positions are multiples of it."""
+SHAPE_STEP = 2e-5
+"""Metres: shapes are multiples of it."""
+SHAPE_ERROR = 2e-5
 """Largest error of a vertex's shift by one FAP within its borders, in metres along each axis."""
 REACH = 1000
 """Values beyond a FAP's borders for which that holds, too."""
@@ -266,7 +268,7 @@ def _pack_motion(container: Container, figure: FaceFigure, rows: Int64) -> dict[
             if not len(order):
                 continue
             borders, shifts = shifts_at_borders(mesh, order, unit)
-            curves, modes = factorise(shifts, SHAPE_ERROR * size, STEP * size)
+            curves, modes = factorise(shifts, SHAPE_ERROR * size, SHAPE_STEP * size)
             moving = np.flatnonzero(modes.any(axis=(0, 2)))
             if len(moving):
                 tracks.append(
@@ -285,7 +287,7 @@ def _pack_motion(container: Container, figure: FaceFigure, rows: Int64) -> dict[
     return {
         "tracks": tracks,
         "rows": container.add_integers(np.concatenate(moved)),
-        "shapes": container.add_fractions(np.concatenate(shapes), STEP * size),
+        "shapes": container.add_fractions(np.concatenate(shapes), SHAPE_STEP * size),
         "transforms": [
             {
                 "part": parts[owner],

@@ -76,7 +76,7 @@ class TestOfPictures:
             ("neutral_front", {"switches": ("eyes=off",)}),
             ("fap_eyes", {"switches": ("hair=off",)}),
             ("neutral_front", {"switches": ("shadows=off",)}),
-            ("neutral_front", {"faps": ("close_t_l_eyelid=400",)}),
+            ("neutral_front", {"faps": ("close_t_l_eyelid=420",)}),
             ("neutral_front", {"faps": ("head_yaw=2500",)}),
             ("neutral_front", {"faps": ("open_jaw=300",)}),
             ("fap_eyes", {"faps": ("yaw_l_eyeball=25000", "yaw_r_eyeball=15000")}),

@@ -84,7 +84,8 @@ def test_something_is_shown_before_anything_is_prepared(
     assert isinstance(first, np.ndarray)
     assert 100 < np.median(first) < 150  # the grey of the studio
     assert (first[220:260].min(axis=2) > 200).sum() > 60  # letters in the middle
-    assert not (first[:200].min(axis=2) > 200).any()
+    assert (first[20:60].min(axis=2) > 190).sum() > 60  # keys at the lower edge
+    assert not (first[80:180].min(axis=2) > 190).any()
 
 
 def test_the_plain_window_shows_the_face_and_the_timeline(plain: Window) -> None:
