@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 COMPILING = "Compiling for this machine, on the first run only: {} functions"
 FUNCTIONS_TOLD = 3
-"""Functions to be compiled from which on the window says so."""
+"""Number of compiled functions at which the window says so."""
 
 
 @dataclass(frozen=True)
