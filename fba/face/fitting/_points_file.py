@@ -130,7 +130,7 @@ def _landmarks(path: str | os.PathLike[str], size: tuple[int, int] | None) -> di
     if not len(frames):
         raise ModelError(f"{path}: no face was seen; there are no points to take")
     if motion.metric:
-        raise ModelError(f"{path}: its points are in millimetres, and the photograph's pixels are needed")
+        raise ModelError(f"{path}: its points are in space, and those in the photograph's pixels are needed")
     plane: Float64 = motion.positions[frames[0], :, :2]
     if motion.share:
         if size is None:

@@ -6,9 +6,9 @@ what lies towards the inner contour, the outer FAP the rest; sent together, as t
 lip as a whole.
 
 A smile also slides corners that are drawn apart back round the teeth. Lips do not grow thin: their contours
-have FAPs of their own, and captures would find those moved. But between these, lips that open or stretch
-grow flatter. Corners that are raised push the cheek up into a
-bulge below the eye, beside which the fold from nose to mouth deepens.
+have FAPs of their own, and captures would find those moved. But between these, lips that open or stretch grow
+flatter. Corners that are raised push the cheek up into a bulge below the eye, beside which the fold from nose
+to mouth deepens.
 """
 
 from __future__ import annotations
