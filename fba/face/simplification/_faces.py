@@ -48,25 +48,21 @@ lids closed with a broad grin, the lips apart with wide eyes, and the lips pushe
 and lids that meet half way."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-IMPORTANCE = 100.0
+IMPORTANCE = 300.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
-LID_SHARE = 4.0
+LID_SHARE = 5.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
-EYE_SHARE = 0.5
+EYE_SHARE = 0.2
 """Share of that motion for which eyeballs count."""
-LASH_SHARE = 0.4
+LASH_SHARE = 0.3
 """The same for lashes: a hair has little area, yet its lack is seen."""
-TEETH_SHARE = 1.0
+TEETH_SHARE = 0.2
 """The same for teeth, which stand out against the dark behind them."""
-TONGUE_SHARE = 0.2
+TONGUE_SHARE = 0.1
 """The same for the tongue, which bends."""
 HAIRS = ("lash", "brow")
 """Kinds of parts that do not count in a level's error."""
-HAIR_SHARE = 0.1
-"""The same for hair."""
-OTHER_SHARE = 0.2
-"""The same for clothes and what else is worn."""
 RIM_VERTICES = 16
 """Vertices of a pupil's rim that stay."""
 LEVEL_RATIO = 0.32
@@ -147,8 +143,9 @@ class FaceSimplification:
         model, still = self.model.with_tables(lids, {}), self._unmoved(level)
         carried = fit_tables(model, bare, level, still, self.mesh.positions, carried=True)
         plain = author(face.parts, face.points, bound=face.bound)
-        for tables in (close_lids(face), carried, plain.tables):
-            face = take_sounder(face, bare.with_tables(tables, {}))
+        mended = repair_tables(bare.with_tables(carried, {}), plain)
+        for other in (bare.with_tables(close_lids(face), {}), mended, plain):
+            face = take_sounder(face, other)
         return repair_tables(face, plain)
 
     @cached_property
@@ -247,8 +244,6 @@ def _importance(model: FaceModel) -> Float64:
         ("lash", LASH_SHARE),
         ("teeth", TEETH_SHARE),
         ("tongue", TONGUE_SHARE),
-        ("hair", HAIR_SHARE),
-        ("other", OTHER_SHARE),
     ):
         for part in model.of_kind(kind):
             start = model.starts[part.name]

@@ -106,8 +106,10 @@ def _candidates(
 ) -> Iterator[FaceDefTables]:
     if table.fap in region_table():
         yield _within_region(model, table)
-    for share in () if table.fap in LIDS else STOP_SHARES:  # a lid that stops would not meet the other
-        for sides in ((-1,), (1,), (-1, 1)):
+    for share in STOP_SHARES:
+        for sides in (-1,), (1,), (-1, 1):
+            if table.fap in LIDS and 1 in sides:
+                continue  # a lid that stops as it closes would not meet the other
             yield FaceDefTables(
                 table.fap, tuple(_stopped(mesh, share, sides) for mesh in table.meshes), table.transforms
             )
