@@ -48,18 +48,18 @@ lids closed with a broad grin, the lips apart with wide eyes, and the lips pushe
 and lids that meet half way."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-IMPORTANCE = 300.0
+IMPORTANCE = 100.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
 LID_SHARE = 5.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
-EYE_SHARE = 0.2
+EYE_SHARE = 0.35
 """Share of that motion for which eyeballs count."""
-LASH_SHARE = 0.3
+LASH_SHARE = 0.5
 """The same for lashes: a hair has little area, yet its lack is seen."""
-TEETH_SHARE = 0.2
+TEETH_SHARE = 0.35
 """The same for teeth, which stand out against the dark behind them."""
-TONGUE_SHARE = 0.1
+TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""
 HAIRS = ("lash", "brow")
 """Kinds of parts that do not count in a level's error."""
