@@ -38,13 +38,15 @@ from fba.sampling import smoothstep
 STRETCHING = (6, 7, 53, 54)
 RAISING = {12: 1.0, 59: 1.0, 13: -1.0, 60: -1.0}
 """Side of the corner that each FAP raises."""
-STRAIGHT = 100.0
+STRAIGHT = 30.0
 """Value up to which a stretched corner goes straight to the side; then it meets the teeth."""
 BEND = 0.62
 """From there on, its way back as a share of its way to the side."""
-BULGE = (0.62, 0.40)
+BULGE = (0.72, 0.42)
 """How far the cheek comes out, and up, as shares of the way of a raised corner."""
-FOLD = -0.27
+STRETCHED_CHEEK = 0.35
+"""The part of that which a corner that is drawn to the side makes."""
+FOLD = -0.36
 """The same of the fold beside it."""
 CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.12)
 """Where they are: shares of feature points of the left side, and their breadth in ES0."""
@@ -87,10 +89,14 @@ ARCS = {
     55: "upper left", 56: "upper right", 57: "lower left", 58: "lower right",
 }  # fmt: skip
 """Handles beside the corners of the mouth, by the FAPs that make an arc between them."""
-ARC = (2.2, 0.0)
-"""How steep the arc begins on the inner and the outer contour, as shares of the motion of the handle."""
-ARC_VALUE = 300.0
-"""Value up to which the arc grows."""
+ARC = (1.5, 0.0)
+"""How high the arc is on the inner and the outer contour, as shares of the motion of the handle."""
+ARC_POWERS = (0.8, 2.4)
+"""How round it begins at the corner, and how flat it ends at the handle: nearly a quarter of an ellipse."""
+ARC_VALUES = (700.0, 600.0, 500.0, 400.0, 300.0, 200.0, 100.0)
+"""Values up to which the arc grows: the first at which no skin folds."""
+CORNER_ARCS = {"upper": (1.0, 0.7), "lower": (1.0, 0.0)}
+"""Shares of it that a corner takes back, lowered or raised: the arc is in the lip's way from its corner."""
 FLATTENS = dict.fromkeys((4, 5, 8, 9, 10, 11, 51, 52, 55, 56, 57, 58), -1.0) | dict.fromkeys(STRETCHING, 1.0)
 """FAPs that make the red of the lips flatter, and the sign of the values that do."""
 FLATTER, FLAT_VALUE = 0.07, 400.0
@@ -99,6 +105,8 @@ REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.3
 """Reach into the mouth, in ES0."""
+CARRIED = 0.02
+"""Distance along the lips over which the arcs are evened out behind them, in ES0."""
 UNMOVED_POINTS = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9", "3.10")
 """Feature points that the lips do not move."""
 SLACK = 0.25
@@ -147,8 +155,9 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             pair = coupled_motions(limiter, (inner, inner), (outer, outer), number)
             motions[number], motions[mate] = pair
     for number in FLATTENS.keys() & motions.keys():
-        shaped = _with_shape(marks, lips, number, motions[number])
-        motions[number] = stop_at_folds(limiter, unfold(surface, limiter, shaped, pinned, False))
+        motions[number] = _flatter(marks, limiter, lips, number, motions[number])
+    for number in (ARCS | RAISING).keys() & motions.keys() & set(range(50)):
+        _add_arcs(marks, limiter, lips, number, motions)
     return {fap: add_smile(marks, limiter, fap, motion) for fap, motion in motions.items()}, lost
 
 
@@ -213,7 +222,7 @@ def _fields(marks: Landmarks) -> _Lips:
                 for name in arcs if not any(_twin(marks, point) for point in points) else ():
                     if name in handles:
                         away = np.minimum(np.abs(places - (4 if "right" in name else 0)), 1.0)
-                        values[walk, len(names) + arcs.index(name)] = ARC[number] * away * (1 - away) ** 3
+                        values[walk, len(names) + arcs.index(name)] = _arc(away, ARC[number])
     for name, pair in HANDLES.items():
         for point in pair:
             if marks.has(point) and not _twin(marks, point) and not np.isnan(values[marks.vertex[point], 0]):
@@ -227,12 +236,37 @@ def _fields(marks: Landmarks) -> _Lips:
     free = reachable_region(near, far, REACH * es)
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
+    solved[:, len(names) :] = _carry_inside(marks, solved[:, len(names) :])
     shares = [trim_small(column) for column in solved.T]
     return _Lips(
         dict(zip(names, shares, strict=False)),
         dict(zip(arcs, shares[len(names) :], strict=True)),
         _inward(marks),
     )
+
+
+def _arc(away: Float64, height: float) -> Float64:
+    """Return (M,) what the arc adds at places from the corner, 0, to the handle, 1."""
+    return np.asarray(height * away ** ARC_POWERS[0] * (1 - away) ** ARC_POWERS[1])
+
+
+def _carry_inside(marks: Landmarks, arcs: Float64) -> Float64:
+    """Return arcs (N, K) that go on behind the lips as they are there, as a plate would end them too soon."""
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    inside = np.flatnonzero(marks.inside_mouth & ~marks.on_inner_lips)
+    walks = [walk for half in ("upper", "lower") if len(walk := marks.contour(f"{half} inner lip"))]
+    if not len(inside) or len(walks) < 2:
+        return arcs
+    depths = [surface.distances(walk, limit=2 * REACH_INSIDE * es)[inside] for walk in walks]
+    depths = [np.minimum(depth, 2 * REACH_INSIDE * es) for depth in depths]
+    arcs = arcs.copy()
+    arcs[inside] = 0.0
+    for walk, depth, other in zip(walks, depths, depths[::-1], strict=True):
+        away = np.linalg.norm(surface.vertices[inside][:, None] - surface.vertices[walk], axis=2)
+        near = np.exp(-(((away - away.min(axis=1, keepdims=True)) / (CARRIED * es)) ** 2))
+        own = smoothstep(0.5 + (other - depth) / (4 * CARRIED * es)) * (1 - smoothstep(depth / (REACH_INSIDE * es)))
+        arcs[inside] += own[:, None] * (near @ arcs[walk]) / near.sum(axis=1, keepdims=True)
+    return arcs
 
 
 def _inward(marks: Landmarks) -> Float64:
@@ -302,24 +336,64 @@ def smooth_weights(x: Float64, count: int) -> Float64:
     return weights
 
 
-def _with_shape(marks: Landmarks, lips: _Lips, fap: int, motion: Motion) -> Motion:
-    """Return the motion with the arc beside a corner of the mouth, and with lips that grow flatter."""
-    inner = fap < 50
-    if fap in ARCS:
-        arc = lips.arc[ARCS[fap]] * (lips.inward if inner else 1 - lips.inward)
-        motion = _adding(motion, arc[:, None] * marks.step(fap), (-ARC_VALUE, ARC_VALUE))
+def _flatter(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motion: Motion) -> Motion:
+    """Return the motion with lips that grow flatter."""
     between = 4 * lips.inward * (1 - lips.inward) * np.clip(_fap_field(lips, fap), 0.0, 1.0)
     size = float(np.linalg.norm(marks.step(fap))) * FLATTENS[fap] * FLATTER / 2
     flatter = trim_small(between)[:, None] * -size * marks.surface.normals
     low, high = sorted((0.0, FLATTENS[fap] * FLAT_VALUE))
-    return _adding(motion, flatter, (low, high))
+    shaped = _adding(motion, flatter, (low, high))
+    pinned = marks.on_contours(*LIP_CONTOURS)
+    return stop_at_folds(limiter, unfold(marks.surface, limiter, shaped, pinned, False))
+
+
+def _add_arcs(
+    marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motions: dict[int, Motion]
+) -> None:
+    """Add the arcs beside a corner of the mouth to the motion of an inner FAP, in place.
+
+    Where they would fold its skin, which the outer contour leaves no more room, they go on with its mate.
+    """
+    pinned = marks.on_contours(*LIP_CONTOURS)
+    for sign, field in zip((-1.0, 1.0), _arc_fields(marks, lips, fap), strict=True):
+        done = 0.0
+        for number in (fap, faps()[fap - 1].lip_mate):
+            for most in ARC_VALUES if number in motions else ():
+                if most <= done:
+                    break
+                shaped = _adding(motions[number], field, sorted((sign * done, sign * most)))
+                shaped = unfold(marks.surface, limiter, shaped, pinned, False)
+                if _is_sound(limiter, shaped):
+                    motions[number], done = shaped, most
+                    break
+
+
+def _is_sound(limiter: Limiter, motion: Motion) -> bool:
+    patch = limiter.patch(motion.vertices)
+    return all(patch.is_sound(limiter.spread(motion.vertices, shifts)) for shifts in motion.shifts)
+
+
+def _arc_fields(marks: Landmarks, lips: _Lips, fap: int) -> tuple[Float64, Float64]:
+    """Return (N, 3) what arcs add for each unit of value below 0, and above.
+
+    A corner moves away from under the arcs beside it, which stay with their lips.
+    """
+    shares = {ARCS[fap]: (1.0, 1.0)} if fap in ARCS else {}
+    if fap in RAISING:
+        side = "left" if RAISING[fap] > 0 else "right"
+        shares = {f"{lip} {side}": (-low, -high) for lip, (low, high) in CORNER_ARCS.items()}
+    field = np.zeros((2, len(lips.inward)))
+    for name, share in shares.items():
+        field += np.array(share)[:, None] * lips.arc[name] * lips.inward
+    low, high = field[:, :, None] * marks.step(fap)
+    return low, high
 
 
 def _adding(motion: Motion, field: Float64, ends: tuple[float, float]) -> Motion:
     """Return the motion with value x field (N, 3) of the surface added, for values between two ends."""
     motion = _including(motion, np.flatnonzero(field.any(axis=1)))
     values = np.union1d(motion.values, np.clip(ends, motion.values[0], motion.values[-1]))
-    ways = np.clip(values, *ends)[:, None, None]
+    ways = (np.clip(values, *ends) - np.clip(0.0, *ends))[:, None, None]
     shifts = np.stack([motion.shifts_at(value) for value in values]) + ways * field[motion.vertices]
     return Motion(values, motion.vertices, shifts)
 
@@ -327,9 +401,13 @@ def _adding(motion: Motion, field: Float64, ends: tuple[float, float]) -> Motion
 def add_smile(marks: Landmarks, limiter: Limiter, fap: int, motion: Motion) -> Motion:
     """Return the motion of the corner of the mouth by a FAP with what goes along; others as they are."""
     if fap in STRETCHING:
-        return stop_at_folds(limiter, _stretched(_with_knot(motion)))
+        ways = STRETCHED_CHEEK * marks.fapu.MW * np.maximum(_ways(_with_knot(motion).values, fap), 0.0)
+        side = 1.0 if fap in (6, 53) else -1.0
+        motion = _with_cheek(marks, _stretched(_with_knot(motion)), side, ways, outer=fap > 50)
+        return stop_at_folds(limiter, motion)
     if fap in RAISING:
-        return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], outer=fap > 50))
+        ways = _ways(motion.values, 12) * marks.fapu.MNS
+        return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], ways, outer=fap > 50))
     return motion
 
 
@@ -347,8 +425,11 @@ def _stretched(motion: Motion) -> Motion:
     return Motion(motion.values, motion.vertices, shifts)
 
 
-def _with_cheek(marks: Landmarks, motion: Motion, side: float, *, outer: bool) -> Motion:
-    """Return a raised corner with the cheek's bulge, of which the outer contour's FAP has the most."""
+def _with_cheek(marks: Landmarks, motion: Motion, side: float, ways: Float64, *, outer: bool) -> Motion:
+    """Return a corner's motion with the cheek's bulge, of which the outer contour's FAP has the most.
+
+    ways: (K,) metres of the corner at the motion's values.
+    """
     surface, es = marks.surface, marks.fapu.ES * 1024
     share = 0.8 if outer else 0.2
     corner = marks.point_or_average("8.3" if side > 0 else "8.4")
@@ -367,8 +448,7 @@ def _with_cheek(marks: Landmarks, motion: Motion, side: float, *, outer: bool) -
         field += weight[:, None] * (out * surface.normals + (0.0, up, 0.0))
     field *= share
     motion = _including(motion, np.flatnonzero(field.any(axis=1)))
-    raised = _ways(motion.values, 12) * marks.fapu.MNS
-    shifts = motion.shifts + raised[:, None, None] * field[motion.vertices]
+    shifts = motion.shifts + ways[:, None, None] * field[motion.vertices]
     return Motion(motion.values, motion.vertices, shifts)
 
 
