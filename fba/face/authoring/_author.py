@@ -244,7 +244,7 @@ class _Authoring:
         hollow = hollowing(self.marks)
         moving = np.flatnonzero((jaw.share > 0) | hollow.any(axis=1))
         shifts = opening_shifts(points[moving], jaw, angles) * jaw.share[moving][:, None]
-        sunk = -opening_shifts(jaw.chin[None], jaw, angles)[:, :, 1:]
+        sunk = -opening_shifts(jaw.chin[None], jaw, angles)[:, :, 1:2]
         shifts += sunk * hollow[moving]
         pinned = self.marks.on_contours(*LIP_CONTOURS)
         pinned[self.marks.vertices_of(CHIN)] = True

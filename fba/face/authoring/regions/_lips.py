@@ -48,8 +48,10 @@ STRETCHED_CHEEK = 0.35
 """The part of that which a corner that is drawn to the side makes."""
 FOLD = -0.36
 """The same of the fold beside it."""
-CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.12)
-"""Where they are: shares of feature points of the left side, and their breadth in ES0."""
+CHEEK, CHEEK_BREADTH = {"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265
+"""Where the bulge is: shares of feature points of the left side, and its breadth in ES0."""
+FOLD_ENDS, FOLD_BREADTH = ({"8.3": 0.15, "9.1": 0.85}, {"8.3": 0.85, "9.1": 0.15}), 0.085
+"""The same of the ends of the fold."""
 RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
 SMILE_NEAR, SMILE_REACH = 0.54, 0.78
 """Distances from the corner of the mouth between which all that fades out, in ES0."""
@@ -95,7 +97,7 @@ ARC_POWERS = (0.8, 2.4)
 """How round it begins at the corner, and how flat it ends at the handle: nearly a quarter of an ellipse."""
 ARC_VALUES = (700.0, 600.0, 500.0, 400.0, 300.0, 200.0, 100.0)
 """Values up to which the arc grows: the first at which no skin folds."""
-CORNER_ARCS = {"upper": (1.0, 0.7), "lower": (1.0, 0.0)}
+CORNER_ARCS = {"upper": (1.0, 0.7), "lower": (1.0, 0.6)}
 """Shares of it that a corner takes back, lowered or raised: the arc is in the lip's way from its corner."""
 FLATTENS = dict.fromkeys((4, 5, 8, 9, 10, 11, 51, 52, 55, 56, 57, 58), -1.0) | dict.fromkeys(STRETCHING, 1.0)
 """FAPs that make the red of the lips flatter, and the sign of the values that do."""
@@ -435,21 +437,30 @@ def _with_cheek(marks: Landmarks, motion: Motion, side: float, ways: Float64, *,
     corner = marks.point_or_average("8.3" if side > 0 else "8.4")
     away = np.linalg.norm(surface.vertices - corner, axis=1) / es
     near = smoothstep((SMILE_REACH - away) / (SMILE_REACH - SMILE_NEAR)) * ~(marks.inside_mouth | marks.lips)
-    field = np.zeros((len(surface), 3))
-    for (points, breadth), (out, up), beside in (
-        (CHEEK, BULGE, 0.0),
-        (FOLD_PLACE, (FOLD, 0.0), FOLD_OUTWARD),
-    ):
-        names = {name if side > 0 else RIGHT[name]: part for name, part in points.items()}
-        centre = np.sum([part * marks.point_or_average(name) for name, part in names.items()], axis=0)
-        centre[0] += side * beside * es
-        distance = np.linalg.norm(surface.vertices - centre, axis=1)
-        weight = near * np.exp(-((distance / (breadth * es)) ** 2))
-        field += weight[:, None] * (out * surface.normals + (0.0, up, 0.0))
-    field *= share
-    motion = _including(motion, np.flatnonzero(field.any(axis=1)))
-    shifts = motion.shifts + ways[:, None, None] * field[motion.vertices]
+    bulge = _near_segment(marks, side, (CHEEK, CHEEK), 0.0) / CHEEK_BREADTH
+    fold = _near_segment(marks, side, FOLD_ENDS, FOLD_OUTWARD) / FOLD_BREADTH
+    bulge, fold = (near * np.exp(-(distance**2)) for distance in (bulge, fold))
+    cheek = share * bulge[:, None] * (BULGE[0] * surface.normals + (0.0, BULGE[1], 0.0))
+    crease = share * FOLD * fold[:, None] * surface.normals
+    motion = _including(motion, np.flatnonzero(cheek.any(axis=1) | crease.any(axis=1)))
+    ways = ways[:, None, None]
+    shifts = motion.shifts + ways * cheek[motion.vertices] + np.maximum(ways, 0.0) * crease[motion.vertices]
     return Motion(motion.values, motion.vertices, shifts)
+
+
+def _near_segment(
+    marks: Landmarks, side: float, ends: tuple[dict[str, float], dict[str, float]], outward: float
+) -> Float64:
+    """Return (N,) distances in ES0 from a segment between mixtures of feature points, moved outward."""
+    es = marks.fapu.ES * 1024
+    start, end = (
+        np.sum([part * marks.point_or_average(name if side > 0 else RIGHT[name]) for name, part in mix.items()], axis=0)
+        for mix in ends
+    )
+    along = end - start
+    offset = marks.surface.vertices - start - (side * outward * es, 0.0, 0.0)
+    place = np.clip(offset @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(offset - place[:, None] * along, axis=1) / es)
 
 
 def _ways(values: Float64, fap: int) -> Float64:
