@@ -55,6 +55,8 @@ FOLD_ENDS, FOLD_BREADTH = ({"8.3": 0.15, "9.1": 0.85}, {"8.3": 0.85, "9.1": 0.15
 RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
 SMILE_NEAR, SMILE_REACH = 0.54, 0.78
 """Distances from the corner of the mouth between which all that fades out, in ES0."""
+CORNER_STILL = 0.06
+"""Distance from the corner of the mouth up to which it does not, in ES0."""
 FOLD_OUTWARD = 0.09
 """Distance of the fold outside of the line from nose to mouth, in ES0."""
 # The handles:
@@ -105,7 +107,7 @@ FLATTER, FLAT_VALUE = 0.07, 400.0
 """By how much, as a share of the way of the handle, and the value up to which that grows."""
 REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
-REACH_INSIDE = 0.3
+REACH_INSIDE = 0.5
 """Reach into the mouth, in ES0."""
 CARRIED = 0.02
 """Distance along the lips over which the arcs are evened out behind them, in ES0."""
@@ -437,6 +439,7 @@ def _with_cheek(marks: Landmarks, motion: Motion, side: float, ways: Float64, *,
     corner = marks.point_or_average("8.3" if side > 0 else "8.4")
     away = np.linalg.norm(surface.vertices - corner, axis=1) / es
     near = smoothstep((SMILE_REACH - away) / (SMILE_REACH - SMILE_NEAR)) * ~(marks.inside_mouth | marks.lips)
+    near = near * smoothstep((away - CORNER_STILL) / CORNER_STILL)  # the corner has FAPs of its own
     bulge = _near_segment(marks, side, (CHEEK, CHEEK), 0.0) / CHEEK_BREADTH
     fold = _near_segment(marks, side, FOLD_ENDS, FOLD_OUTWARD) / FOLD_BREADTH
     bulge, fold = (near * np.exp(-(distance**2)) for distance in (bulge, fold))
