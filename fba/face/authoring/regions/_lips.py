@@ -5,10 +5,8 @@ around them. The corners of a lip that opens are arcs, not the ends of a straigh
 what lies towards the inner contour, the outer FAP the rest; sent together, as they mostly are, they move the
 lip as a whole.
 
-A smile also slides corners that are drawn apart back round the teeth. Lips do not grow thin: their contours
-have FAPs of their own, and captures would find those moved. But between these, lips that open or stretch grow
-flatter. Corners that are raised push the cheek up into a bulge below the eye, beside which the fold from nose
-to mouth deepens.
+Lips do not grow thin: their contours have FAPs of their own, and captures would find those moved. But between
+these, lips that open or stretch grow flatter.
 """
 
 from __future__ import annotations
@@ -19,13 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.face.authoring.regions._smile import RAISING, STRETCHING, add_smile
 from fba.face.authoring.surface._fold_limits import Limiter
-from fba.face.authoring.surface._motion import Motion, ease_field, unfold
+from fba.face.authoring.surface._motion import Motion, ease_field, including, unfold
 from fba.face.authoring.surface._motion_limits import (
     coupled_motions,
     eased_linear_motion,
-    human_range,
-    soft_limit,
     stop_at_folds,
     values_to_reach,
 )
@@ -34,32 +31,6 @@ from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.parameters import faps
 from fba.sampling import smoothstep
 
-# What a smile does beside moving the corners of the mouth:
-STRETCHING = (6, 7, 53, 54)
-RAISING = {12: 1.0, 59: 1.0, 13: -1.0, 60: -1.0}
-"""Side of the corner that each FAP raises."""
-STRAIGHT = 30.0
-"""Value up to which a stretched corner goes straight to the side; then it meets the teeth."""
-BEND = 0.62
-"""From there on, its way back as a share of its way to the side."""
-BULGE = (0.72, 0.42)
-"""How far the cheek comes out, and up, as shares of the way of a raised corner."""
-STRETCHED_CHEEK = 0.35
-"""The part of that which a corner that is drawn to the side makes."""
-FOLD = -0.36
-"""The same of the fold beside it."""
-CHEEK, CHEEK_BREADTH = {"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265
-"""Where the bulge is: shares of feature points of the left side, and its breadth in ES0."""
-FOLD_ENDS, FOLD_BREADTH = ({"8.3": 0.15, "9.1": 0.85}, {"8.3": 0.85, "9.1": 0.15}), 0.085
-"""The same of the ends of the fold."""
-RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
-SMILE_NEAR, SMILE_REACH = 0.54, 0.78
-"""Distances from the corner of the mouth between which all that fades out, in ES0."""
-CORNER_STILL = 0.06
-"""Distance from the corner of the mouth up to which it does not, in ES0."""
-FOLD_OUTWARD = 0.09
-"""Distance of the fold outside of the line from nose to mouth, in ES0."""
-# The handles:
 HANDLES = {
     "left corner": ("2.4", "8.3"),
     "upper left": ("2.6", "8.5"),
@@ -109,6 +80,8 @@ REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.5
 """Reach into the mouth, in ES0."""
+LEAST_ARC = 0.015
+"""What is less of an arc is left out."""
 CARRIED = 0.02
 """Distance along the lips over which the arcs are evened out behind them, in ES0."""
 UNMOVED_POINTS = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9", "3.10")
@@ -241,10 +214,12 @@ def _fields(marks: Landmarks) -> _Lips:
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
     solved[:, len(names) :] = _carry_inside(marks, solved[:, len(names) :])
-    shares = [trim_small(column) for column in solved.T]
     return _Lips(
-        dict(zip(names, shares, strict=False)),
-        dict(zip(arcs, shares[len(names) :], strict=True)),
+        {name: trim_small(column) for name, column in zip(names, solved.T, strict=False)},
+        {
+            name: trim_small(column, LEAST_ARC)
+            for name, column in zip(arcs, solved.T[len(names) :], strict=True)
+        },
         _inward(marks),
     )
 
@@ -268,7 +243,8 @@ def _carry_inside(marks: Landmarks, arcs: Float64) -> Float64:
     for walk, depth, other in zip(walks, depths, depths[::-1], strict=True):
         away = np.linalg.norm(surface.vertices[inside][:, None] - surface.vertices[walk], axis=2)
         near = np.exp(-(((away - away.min(axis=1, keepdims=True)) / (CARRIED * es)) ** 2))
-        own = smoothstep(0.5 + (other - depth) / (4 * CARRIED * es)) * (1 - smoothstep(depth / (REACH_INSIDE * es)))
+        own = smoothstep(0.5 + (other - depth) / (4 * CARRIED * es))
+        own *= 1 - smoothstep(depth / (REACH_INSIDE * es))
         arcs[inside] += own[:, None] * (near @ arcs[walk]) / near.sum(axis=1, keepdims=True)
     return arcs
 
@@ -351,9 +327,7 @@ def _flatter(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motion: 
     return stop_at_folds(limiter, unfold(marks.surface, limiter, shaped, pinned, False))
 
 
-def _add_arcs(
-    marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motions: dict[int, Motion]
-) -> None:
+def _add_arcs(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motions: dict[int, Motion]) -> None:
     """Add the arcs beside a corner of the mouth to the motion of an inner FAP, in place.
 
     Where they would fold its skin, which the outer contour leaves no more room, they go on with its mate.
@@ -395,86 +369,8 @@ def _arc_fields(marks: Landmarks, lips: _Lips, fap: int) -> tuple[Float64, Float
 
 def _adding(motion: Motion, field: Float64, ends: tuple[float, float]) -> Motion:
     """Return the motion with value x field (N, 3) of the surface added, for values between two ends."""
-    motion = _including(motion, np.flatnonzero(field.any(axis=1)))
+    motion = including(motion, np.flatnonzero(field.any(axis=1)))
     values = np.union1d(motion.values, np.clip(ends, motion.values[0], motion.values[-1]))
     ways = (np.clip(values, *ends) - np.clip(0.0, *ends))[:, None, None]
     shifts = np.stack([motion.shifts_at(value) for value in values]) + ways * field[motion.vertices]
     return Motion(values, motion.vertices, shifts)
-
-
-def add_smile(marks: Landmarks, limiter: Limiter, fap: int, motion: Motion) -> Motion:
-    """Return the motion of the corner of the mouth by a FAP with what goes along; others as they are."""
-    if fap in STRETCHING:
-        ways = STRETCHED_CHEEK * marks.fapu.MW * np.maximum(_ways(_with_knot(motion).values, fap), 0.0)
-        side = 1.0 if fap in (6, 53) else -1.0
-        motion = _with_cheek(marks, _stretched(_with_knot(motion)), side, ways, outer=fap > 50)
-        return stop_at_folds(limiter, motion)
-    if fap in RAISING:
-        ways = _ways(motion.values, 12) * marks.fapu.MNS
-        return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], ways, outer=fap > 50))
-    return motion
-
-
-def _with_knot(motion: Motion) -> Motion:
-    """Return the same motion with `STRAIGHT` among its values."""
-    values = np.union1d(motion.values, [min(STRAIGHT, motion.values[-1])])
-    return Motion(values, motion.vertices, np.stack([motion.shifts_at(value) for value in values]))
-
-
-def _stretched(motion: Motion) -> Motion:
-    """Return a stretch that bends round the teeth."""
-    shifts = motion.shifts.copy()
-    apart = np.abs(motion.shifts[..., 0]) * (motion.values > 0)[:, None]
-    shifts[..., 2] -= BEND * np.maximum(apart - np.abs(motion.shifts_at(STRAIGHT)[:, 0]), 0.0)
-    return Motion(motion.values, motion.vertices, shifts)
-
-
-def _with_cheek(marks: Landmarks, motion: Motion, side: float, ways: Float64, *, outer: bool) -> Motion:
-    """Return a corner's motion with the cheek's bulge, of which the outer contour's FAP has the most.
-
-    ways: (K,) metres of the corner at the motion's values.
-    """
-    surface, es = marks.surface, marks.fapu.ES * 1024
-    share = 0.8 if outer else 0.2
-    corner = marks.point_or_average("8.3" if side > 0 else "8.4")
-    away = np.linalg.norm(surface.vertices - corner, axis=1) / es
-    near = smoothstep((SMILE_REACH - away) / (SMILE_REACH - SMILE_NEAR)) * ~(marks.inside_mouth | marks.lips)
-    near = near * smoothstep((away - CORNER_STILL) / CORNER_STILL)  # the corner has FAPs of its own
-    bulge = _near_segment(marks, side, (CHEEK, CHEEK), 0.0) / CHEEK_BREADTH
-    fold = _near_segment(marks, side, FOLD_ENDS, FOLD_OUTWARD) / FOLD_BREADTH
-    bulge, fold = (near * np.exp(-(distance**2)) for distance in (bulge, fold))
-    cheek = share * bulge[:, None] * (BULGE[0] * surface.normals + (0.0, BULGE[1], 0.0))
-    crease = share * FOLD * fold[:, None] * surface.normals
-    motion = _including(motion, np.flatnonzero(cheek.any(axis=1) | crease.any(axis=1)))
-    ways = ways[:, None, None]
-    shifts = motion.shifts + ways * cheek[motion.vertices] + np.maximum(ways, 0.0) * crease[motion.vertices]
-    return Motion(motion.values, motion.vertices, shifts)
-
-
-def _near_segment(
-    marks: Landmarks, side: float, ends: tuple[dict[str, float], dict[str, float]], outward: float
-) -> Float64:
-    """Return (N,) distances in ES0 from a segment between mixtures of feature points, moved outward."""
-    es = marks.fapu.ES * 1024
-    start, end = (
-        np.sum([part * marks.point_or_average(name if side > 0 else RIGHT[name]) for name, part in mix.items()], axis=0)
-        for mix in ends
-    )
-    along = end - start
-    offset = marks.surface.vertices - start - (side * outward * es, 0.0, 0.0)
-    place = np.clip(offset @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(offset - place[:, None] * along, axis=1) / es)
-
-
-def _ways(values: Float64, fap: int) -> Float64:
-    """Return the values (K,) of a FAP, slowed where human faces end."""
-    most = human_range(fap)
-    return np.array([soft_limit(value, most[int(value > 0)]) for value in values])
-
-
-def _including(motion: Motion, more: Intp) -> Motion:
-    """Return the same motion with further vertices, which stay where they are."""
-    vertices = np.union1d(motion.vertices, more)
-    shifts = np.zeros((len(motion.values), len(vertices), 3))
-    shifts[:, np.searchsorted(vertices, motion.vertices)] = motion.shifts
-    return Motion(motion.values, vertices, shifts)
