@@ -214,12 +214,10 @@ def _fields(marks: Landmarks) -> _Lips:
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
     solved[:, len(names) :] = _carry_inside(marks, solved[:, len(names) :])
+    shares, heights = solved.T[: len(names)], solved.T[len(names) :]
     return _Lips(
-        {name: trim_small(column) for name, column in zip(names, solved.T, strict=False)},
-        {
-            name: trim_small(column, LEAST_ARC)
-            for name, column in zip(arcs, solved.T[len(names) :], strict=True)
-        },
+        {name: trim_small(share) for name, share in zip(names, shares, strict=True)},
+        {name: trim_small(height, LEAST_ARC) for name, height in zip(arcs, heights, strict=True)},
         _inward(marks),
     )
 
@@ -244,7 +242,7 @@ def _carry_inside(marks: Landmarks, arcs: Float64) -> Float64:
         away = np.linalg.norm(surface.vertices[inside][:, None] - surface.vertices[walk], axis=2)
         near = np.exp(-(((away - away.min(axis=1, keepdims=True)) / (CARRIED * es)) ** 2))
         own = smoothstep(0.5 + (other - depth) / (4 * CARRIED * es))
-        own *= 1 - smoothstep(depth / (REACH_INSIDE * es))
+        own *= 1 - smoothstep(depth / (REACH_INSIDE / 2 * es))
         arcs[inside] += own[:, None] * (near @ arcs[walk]) / near.sum(axis=1, keepdims=True)
     return arcs
 
