@@ -31,12 +31,12 @@ FOLD = -0.36
 """The same of the fold beside it."""
 CHEEK, CHEEK_BREADTH = {"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265
 """Where the bulge is: shares of feature points of the left side, and its breadth in ES0."""
-FOLD_ENDS, FOLD_BREADTH = ({"8.3": 0.15, "9.1": 0.85}, {"8.3": 0.85, "9.1": 0.15}), 0.085
+FOLD_ENDS, FOLD_BREADTH = ({"8.3": 0.15, "9.1": 0.85}, {"8.3": 0.65, "9.1": 0.35}), 0.085
 """The same of the ends of the fold."""
 RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
 SMILE_NEAR, SMILE_REACH = 0.54, 0.78
 """Distances from the corner of the mouth between which all that fades out, in ES0."""
-CORNER_STILL = 0.06
+CORNER_STILL = 0.10
 """Distance from the corner of the mouth up to which it does not, in ES0."""
 LEAST_CHEEK = 0.03
 """What is less of the bulge and the fold is left out."""
