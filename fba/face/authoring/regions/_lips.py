@@ -333,11 +333,12 @@ def _add_arcs(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motions
     pinned = marks.on_contours(*LIP_CONTOURS)
     for sign, field in zip((-1.0, 1.0), _arc_fields(marks, lips, fap), strict=True):
         done = 0.0
-        for number in (fap, faps()[fap - 1].lip_mate):
+        for number in (fap, faps()[fap - 1].lip_mate or fap):
             for most in ARC_VALUES if number in motions else ():
                 if most <= done:
                     break
-                shaped = _adding(motions[number], field, sorted((sign * done, sign * most)))
+                low, high = sorted((sign * done, sign * most))
+                shaped = _adding(motions[number], field, (low, high))
                 shaped = unfold(marks.surface, limiter, shaped, pinned, False)
                 if _is_sound(limiter, shaped):
                     motions[number], done = shaped, most
