@@ -33,8 +33,7 @@ def find_turned_legs(body: BodyTrack) -> str | None:
         return None
     return (
         f"knees bend forward in {forward} of {len(body)} frames, by up to {most:.0f} degrees: an old file, "
-        "whose legs turn the other way? --axes vreng shows it so, "
-        "fba convert OLD NEW.bap --axes vreng mends it"
+        "whose legs turn the other way?"
     )
 
 

@@ -183,11 +183,18 @@ def read_file(
     return ReadFile(path, animation, reader, read_rate, captured, table, doubt, data)
 
 
-def warn_of_turned_legs(name: str | Path, animation: Animation) -> None:
-    """Warn if a body bends its knees forward."""
+def find_in_body(animation: Animation) -> str | None:
+    """Return what is odd about a body, and the options that help; None if nothing is."""
     from fba.body.turned_legs import find_turned_legs
 
-    if animation.body is not None and (finding := find_turned_legs(animation.body)):
+    if animation.body is None or (finding := find_turned_legs(animation.body)) is None:
+        return None
+    return f"{finding} --axes vreng shows it so, fba convert OLD NEW.bap --axes vreng mends it"
+
+
+def warn_of_turned_legs(name: str | Path, animation: Animation) -> None:
+    """Warn if a body bends its knees forward."""
+    if finding := find_in_body(animation):
         warn(f"{STANDARD_INPUT if str(name) == '-' else name}: {finding}", stacklevel=2)
 
 

@@ -17,6 +17,7 @@ from fba.cli.inputs import (
     Reading,
     check_clip,
     find_format,
+    find_in_body,
     input_file,
     probe_input,
     read_stream,
@@ -159,8 +160,6 @@ def _report_face(
 
 def _find_in_body(file: Path, reader: Format, reading: Reading) -> tuple[str, ...]:
     """Return what is odd about the BAPs of a file."""
-    from fba.body.turned_legs import find_turned_legs
-
     given = {
         "source_rate": reading.source_rate,
         "bap_steps": reading.bap_steps,
@@ -170,8 +169,7 @@ def _find_in_body(file: Path, reader: Format, reading: Reading) -> tuple[str, ..
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FbaWarning)  # the description has them
-        body = reader.read(file, **taken_options(given, reader.read_options)).body
-    finding = None if body is None else find_turned_legs(body)
+        finding = find_in_body(reader.read(file, **taken_options(given, reader.read_options)))
     return () if finding is None else (finding,)
 
 
