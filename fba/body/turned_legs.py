@@ -15,8 +15,8 @@ from fba.parameters import BAP_COUNT, bap_numbers
 from fba.tracks import BodyTrack, batches
 
 BENT = 20.0
-"""Degrees from which a knee counts as bent. No knee in 60 captures, streams and vectors of others, which
-stretch them by up to 15 degrees, is bent forward."""
+"""Degrees from which a knee counts as bent. Captures stretch knees by up to 15 degrees; of 252 bodies in
+captures, streams and vectors, only an old file whose legs turn the other way bends them forward by more."""
 
 
 def find_turned_legs(body: BodyTrack) -> str | None:
