@@ -19,7 +19,7 @@ from fba.choices import BapTableOrAuto
 from fba.cli import options, step_tables
 from fba.cli.command import STANDARD_INPUT
 from fba.cli.option_fields import option
-from fba.errors import FbaError, FbaWarning, FormatError, OptionError
+from fba.errors import FbaError, FbaWarning, FormatError, OptionError, warn
 from fba.limits import Limits
 from fba.parameters import BAP_STEPS_AUTO, BapTable
 from fba.source import read_head
@@ -181,6 +181,21 @@ def read_file(
     if rate is not None and read_rate != rate:
         animation = animation.resample(rate, limits=limits)
     return ReadFile(path, animation, reader, read_rate, captured, table, doubt, data)
+
+
+def find_in_body(animation: Animation) -> str | None:
+    """Return what is odd about a body, and the options that help; None if nothing is."""
+    from fba.body.turned_legs import find_turned_legs
+
+    if animation.body is None or (finding := find_turned_legs(animation.body)) is None:
+        return None
+    return f"{finding} --axes vreng shows it so, fba convert OLD NEW.bap --axes vreng mends it"
+
+
+def warn_of_turned_legs(name: str | Path, animation: Animation) -> None:
+    """Warn if a body bends its knees forward."""
+    if finding := find_in_body(animation):
+        warn(f"{STANDARD_INPUT if str(name) == '-' else name}: {finding}", stacklevel=2)
 
 
 def read_stream(file: Path, reading: Reading, reader: Format | None = None) -> bytes:

@@ -241,6 +241,9 @@ def build_scene(
     joints = read_body_joints(how.maps, how.body, how.limit)
     face = inputs.read_model(how.model, how.figure)
     figure = inputs.read_body(how.body, joints, how.figure)
+    for name, animation in zip(names, animations, strict=True):
+        if how.axes == "iso" and isinstance(animation, Animation):
+            inputs.warn_of_turned_legs(name, animation)
     scenes = [_build_one(animation, face, figure, how) for animation in animations]
     result: Any = scenes[0]
     if len(scenes) > 1:

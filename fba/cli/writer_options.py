@@ -35,7 +35,8 @@ class WriterOptions:
         type=options.FILE, metavar="FILE.glb", help="glTF: the body; default: the built-in person."
     )
     axes: Literal["iso", "vreng"] | None = option(
-        help="BVH, glTF: which way BAPs turn: as the standard says (default), or as in old files."
+        help="BAP, BVH, glTF: which way the BAPs of the input turn: as the standard says (default), or as in "
+        "old files."
     )
 
     @property
@@ -72,9 +73,10 @@ def flag(name: str) -> str:
 def _misplaced_text(name: str, target: Path, writing: Format) -> str:
     from fba.formats import formats
 
-    takers = [entry.name.upper() for entry in formats() if name in entry.write_options]
+    able = [entry.name.upper() for entry in formats() if name in entry.write_options]
+    takers = " and ".join(filter(None, [", ".join(able[:-1]), *able[-1:]]))
     taken = [flag(each.name) for each in fields(WriterOptions) if each.name in writing.write_options]
     return (
-        f"{flag(name)} is an option for {' and '.join(takers)}, and {target} becomes "
+        f"{flag(name)} is an option for {takers}, and {target} becomes "
         f"{writing.name.upper()}, which takes {', '.join(taken) or 'none of these options'}"
     )

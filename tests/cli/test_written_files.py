@@ -1,5 +1,6 @@
 """decode --output and convert: files for other programs, and the options of their writers."""
 
+import json
 import re
 from pathlib import Path
 
@@ -8,9 +9,10 @@ import pytest
 
 import fba
 from command_line import Run
-from fba import Animation
+from fba import Animation, BodyTrack
 from fba.body import BodyModel
 from fba.gltf import read_gltf
+from fba.parameters import BAP_COUNT, bap_numbers
 
 
 @pytest.fixture
@@ -77,6 +79,27 @@ def test_another_body_and_axes(run: Run, tmp_path: Path, stream: Path) -> None:
     assert "body.glb" in run("convert", stream, target, "--model", tmp_path / "body.glb", code=1).err
 
 
+def test_knees_that_bend_forward_are_told_and_mended(run: Run, tmp_path: Path) -> None:
+    values = np.zeros((3, BAP_COUNT), dtype=np.int32)
+    values[:, bap_numbers()["l_knee_flexion"] - 1] = 50_000
+    old, new, stream = tmp_path / "old.bap", tmp_path / "new.bap", tmp_path / "old.fba"
+    fba.write(old, Animation(25, np.arange(3), None, BodyTrack(values, values != 0)))
+    finding = "knees bend forward in 3 of 3 frames, by up to 29 degrees"
+    assert f"fba: warning: {old}: {finding}" in run("encode", old, "-o", stream).err
+    assert finding in run("convert", old, tmp_path / "old.bvh").err
+    assert finding in run("decode", stream, "-o", new).err
+    for path in (old, stream):
+        assert f"  found    {finding}" in run("info", path).out
+        assert finding in json.loads(run("info", "--json", path).out)["findings"][0]
+    for command in (("decode", stream, "-o", new), ("convert", old, new)):
+        assert finding not in run(*command, "--axes", "vreng").err
+        assert run("info", new).out.count("found") == 0
+        assert (fba.read(new).body.values[:, 9] < -49_000).all()
+    shown = ("-o", tmp_path / "a.png", "--size", "32x32")
+    assert finding in run("render", old, *shown).err
+    assert finding not in run("render", old, *shown, "--axes", "vreng").err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -86,7 +109,7 @@ def test_another_body_and_axes(run: Run, tmp_path: Path, stream: Path) -> None:
             "--body, --axes",
         ),
         (["-o", "a.bvh", "--no-mesh"], "a.bvh becomes BVH, which takes --joints, --unit, --axes"),
-        (["-o", "a.fap", "--axes", "vreng"], "BVH and GLTF, and a.fap becomes FAP, which takes none"),
+        (["-o", "a.fap", "--axes", "vreng"], "BAP, BVH and GLTF, and a.fap becomes FAP, which takes none"),
         (["--fap", "a.fap", "--unit", "m"], "--unit says how to write --output; give that too"),
         (["--fap", "a.fap", "--to", "bvh"], "--to says how to write --output"),
         (["-o", "a.fba"], "fba convert and fba encode write them"),

@@ -128,7 +128,7 @@ def make_shirt(body: Body) -> Garment:
         0.0042
         + 0.0075 * loose * ~arms
         + 0.0026 * collar  # a bent neck must stay below it
-        + (0.0040 + 0.011 * below) * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
+        + (0.0085 + 0.008 * below) * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
     )
     return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.4 * loose, 14, SHIRT, 0.014)
 

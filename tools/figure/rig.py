@@ -35,9 +35,9 @@ NECK = ("Neck1", "Neck2")
 ARM = ("shoulder", "elbow", "wrist", "thumb", *FINGERS)
 HEAD = ("Head", "HeadEnd", "Jaw", "LeftEye", "RightEye")
 
-CAP = (-0.11, 0.05)
+CAP = (-0.14, 0.05)
 """Heights from the joint over which moving in the cap fades in, metres."""
-LEFT = 0.45
+LEFT = 0.48
 """Share that remains of its distance beyond SIDE, at the upper of these heights."""
 SIDE = -0.010
 """Metres out from the joint from which that distance is measured."""

@@ -17,7 +17,15 @@ from fba.cli.coding.coded_streams import CodedStream, encode_stream
 from fba.cli.coding.rate_options import amount_type
 from fba.cli.coding.size_options import Size
 from fba.cli.command import Command, examples
-from fba.cli.inputs import ReadFile, Reading, check_clip, has_markers, has_skeleton, read_file
+from fba.cli.inputs import (
+    ReadFile,
+    Reading,
+    check_clip,
+    has_markers,
+    has_skeleton,
+    read_file,
+    warn_of_turned_legs,
+)
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.options import is_given
 from fba.cli.outputs import Output, Outputs, display_name, find_writer
@@ -155,6 +163,8 @@ def convert_file(source: Path, target: Path, how: Conversion) -> None:
     elif not bodies_map:
         joints = map_options.read_joints(maps, captures, reading)
     read = read_file(source, reading, rate=how.rate, capture={"joints": joints, "markers": places})
+    if given.axes is None and "body" in writing.carries:
+        warn_of_turned_legs(source, read.animation)
     about = f"{display_name(target)}: {len(read.animation)} frames, {writing.written or writing.description}"
     if writing.name not in ("fba", "mp4"):
         outputs.write_animation(target, read.animation, writing, **extra)

@@ -12,7 +12,7 @@ import click
 from fba.animation import Animation
 from fba.cli import options, step_tables, writer_options
 from fba.cli.command import Command, EachFile, as_typed, examples
-from fba.cli.inputs import Reading, input_file, read_model, read_stream
+from fba.cli.inputs import Reading, input_file, read_model, read_stream, warn_of_turned_legs
 from fba.cli.option_fields import group, option, with_options
 from fba.cli.outputs import (
     STANDARD,
@@ -158,6 +158,8 @@ class _Decoding:
         animation, planes = _read(data, _name(path), None in writings, table, self.reading)
         if asked != BAP_STEPS_AUTO:
             step_tables.warn_of_doubt(path, animation, table, marked_table(data))
+        if with_body and "axes" not in self.settings:
+            warn_of_turned_legs(path, animation)
         visemes = None if self.visemes is None else _visemes(path, animation, self.visemes)
         if self.shows is not None and animation.face is not None:
             animation = replace(animation, face=self.shows(animation.face))

@@ -17,7 +17,7 @@ from fba.cli.coding import capture_options, size_options
 from fba.cli.coding.clamped_values import bring_near, clamped_lines
 from fba.cli.coding.coded_streams import CodedStream, encode_as_epf, encode_stream
 from fba.cli.command import Command, examples
-from fba.cli.inputs import Reading, check_clip, has_markers, has_skeleton
+from fba.cli.inputs import Reading, check_clip, has_markers, has_skeleton, warn_of_turned_legs
 from fba.cli.option_fields import group, option, option_like, with_options
 from fba.cli.outputs import Output, Outputs, display_name, output_option
 from fba.cli.printing import Progress
@@ -216,6 +216,8 @@ def _execute(plan: _Plan) -> _Encoded:
         rate=request.rate,
         name=request.name,
     )
+    for file in taken.files:
+        warn_of_turned_legs(file.path, file.animation)
     spoken = None if plan.sound is None else voice.place_voice(request.sound, taken, plan.sound)
     if plan.detailed and (taken.animation.body is None or not plan.captures):
         raise click.UsageError(

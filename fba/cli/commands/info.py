@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
@@ -17,6 +17,7 @@ from fba.cli.inputs import (
     Reading,
     check_clip,
     find_format,
+    find_in_body,
     input_file,
     probe_input,
     read_stream,
@@ -60,7 +61,8 @@ def command(
 ) -> None:
     """Show what a file holds: frames, rate, parameters, bits. Any format is recognised by content.
 
-    Of the capture of a face it also says what was recorded, and what is odd about it.
+    Of the capture of a face it also says what was recorded, and what is odd about it; of BAPs, whether knees
+    bend forward.
 
     --trace reads the stream a second time, bit by bit, with an independent decoder. It is slow.
     """
@@ -114,7 +116,10 @@ def _report(path: Path, file: Path, reading: Reading, face: str | None, *, print
     tracks = list_tracks(file.read_bytes(), file) if reader.name == "mp4" else ()
     if printed:
         _print(path, info, clips, steps, tracks, size)
-    report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None}
+    findings = () if reader.is_capture or info.body is None else _find_in_body(file, reader, reading)
+    if printed:
+        _print_findings(findings)
+    report = {"file": str(path), **info.to_dict(), "bap_steps_choice": steps or None, "findings": findings}
     if tracks:
         report |= {"file_size": size, "tracks": [each.to_dict() for each in tracks]}
     return report | ({"clips": [asdict(clip) for clip in clips]} if clips else {})
@@ -149,9 +154,28 @@ def _report_face(
             _print_points(capture)
         else:
             _print_shapes(capture)
-        for finding in capture["findings"]:
-            click.echo(f"  found    {finding}")
+        _print_findings(capture["findings"])
     return {"file": str(path), **info.to_dict(), "bap_steps_choice": None, "capture": capture}
+
+
+def _find_in_body(file: Path, reader: Format, reading: Reading) -> tuple[str, ...]:
+    """Return what is odd about the BAPs of a file."""
+    given = {
+        "source_rate": reading.source_rate,
+        "bap_steps": reading.bap_steps,
+        "track": reading.track,
+        "salvage": True,
+        "limits": reading.limit,
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FbaWarning)  # the description has them
+        finding = find_in_body(reader.read(file, **taken_options(given, reader.read_options)))
+    return () if finding is None else (finding,)
+
+
+def _print_findings(findings: Iterable[str]) -> None:
+    for finding in findings:
+        click.echo(f"  found    {finding}")
 
 
 def _trace(path: Path, reading: Reading, *, as_json: bool, values: bool) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from fba.animation import Animation, BodyTrack
+from fba.choices import Axes
 from fba.errors import FormatError
 from fba.formats.text._frame_reader import read_frames
 from fba.formats.text._frame_writer import write_frames
@@ -41,11 +42,17 @@ def read_bap(
     return Animation(frames.header.rate, frames.index, None, body, frames.header.name)
 
 
-def write_bap(path: Path, animation: Animation) -> None:
-    """Write the body track as BAP version 3.2. FormatError without a body track, or if writing fails."""
+def write_bap(path: Path, animation: Animation, *, axes: Axes = "iso") -> None:
+    """Write the body track as BAP version 3.2. FormatError without a body track, or if writing fails.
+
+    axes: the convention by which the BAPs turn now (`fba.body.convention_names()`); they are written by the
+    standard's, "iso". ValueError for one that differs in more than signs.
+    """
+    from fba.body.turned_legs import by_the_standard
+
     body = animation.body
     if body is None:
         raise FormatError(
             "a BAP file holds a body, and this animation has only a face; write .fap or .fba", path=path
         )
-    write_frames(path, bap_layout(), animation, body, lambda batch: batch.values)
+    write_frames(path, bap_layout(), animation, body, lambda batch: by_the_standard(batch, axes).values)
