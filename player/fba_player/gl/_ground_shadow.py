@@ -96,17 +96,17 @@ class GroundShadow:
         target, viewport = self._gl.fbo, self._gl.viewport
         low, width = _ground_around(places)
         frame, part = self._find(casting, low, width)
-        target.use()
-        self._gl.viewport = viewport
-        self._cast(self._darkness, camera=camera, low=low, width=width, part=part)
         corner, size = _ground_near(places)
-        if size <= 2 * CONTACT:
+        near = size <= 2 * CONTACT
+        if near:
             self._darkness.use(3)
             self._shade(
                 "contact", self._near, frame=frame, low=low, width=width, corner=corner, size=size, darkness=3
             )
-            target.use()
-            self._gl.viewport = viewport
+        target.use()
+        self._gl.viewport = viewport
+        self._cast(self._darkness, camera=camera, low=low, width=width, part=part)
+        if near:
             self._cast(self._contact, camera=camera, low=corner, width=size, part=ALL)
         return Shade(self._tops, frame)
 
@@ -169,7 +169,7 @@ class GroundShadow:
         return frame, part
 
     def _place(self, casting: list[FaceMesh], coarsely: bool) -> Float32:
-        """Write the places (N, 3) of all vertices, and return them.
+        """Write the places of all vertices, and return them: (3, N), as NumPy finds extremes of long rows faster.
 
         coarsely: whether few triangles do, as each body covers little of the maps.
         All triangles are drawn at once: software OpenGL takes longer to begin a part than to draw it.
@@ -185,7 +185,7 @@ class GroundShadow:
         ]
         points = np.concatenate(places)
         write_buffer(self._thrown_parts[1], points)
-        return points
+        return np.ascontiguousarray(points.T)
 
     def _join(self, shapes: list[tuple[FaceShape, bool]], parts: list[tuple[Intp, Int32]]) -> None:
         """Make the buffers for the casting vertices of all shapes, one after the other."""
@@ -233,20 +233,20 @@ def _casts(mesh: FaceMesh) -> bool:
 
 
 def _frame_around(points: Float32) -> tuple[float, float, float]:
-    """Return the corner of the square that the key light sees about points (N, 3), a metre's share of it."""
-    seen = points @ BEFORE
-    least, most = seen.min(axis=0), seen.max(axis=0)
+    """Return the corner of the square that the key light sees about points (3, N), a metre's share of it."""
+    seen = BEFORE.T @ points
+    least, most = seen.min(axis=1), seen.max(axis=1)
     width = FRAMED * float(np.ceil((most - least).max() / FRAMED + 0.4))
     u, v = (least + most) / 2 - width / 2  # not in whole texels: shadows would jump as a head turns
     return float(u), float(v), 1 / width
 
 
 def _dark_part(points: Float32, low: tuple[float, float], width: float) -> tuple[float, ...]:
-    """Return where points (N, 3) may darken the ground: corner and size, 0..1, in whole cells."""
-    below = points[:, ::2]
-    thrown = below - np.array(KEY_DIRECTION[::2], dtype=np.float32) / KEY_DIRECTION[1] * points[:, 1:2]
-    least = np.minimum(below.min(axis=0) - SKY_REACH, thrown.min(axis=0) - KEY_REACH)
-    most = np.maximum(below.max(axis=0) + SKY_REACH, thrown.max(axis=0) + KEY_REACH)
+    """Return where points (3, N) may darken the ground: corner and size, 0..1, in whole cells."""
+    below = points[::2]
+    thrown = below - np.array(KEY_DIRECTION[::2], dtype=np.float32)[:, None] / KEY_DIRECTION[1] * points[1]
+    least = np.minimum(below.min(axis=1) - SKY_REACH, thrown.min(axis=1) - KEY_REACH)
+    most = np.maximum(below.max(axis=1) + SKY_REACH, thrown.max(axis=1) + KEY_REACH)
     first, last = (np.clip((end - low) * CELLS / width, 0, CELLS) for end in (least, most))
     first, last = np.floor(first) / CELLS, np.ceil(last) / CELLS
     return (*first.tolist(), *(last - first).tolist())
