@@ -220,7 +220,7 @@ class Renderer:
         blobs = np.ascontiguousarray(view.blobs[:MAX_BLOBS], dtype="f4")
         if not view.ground or not len(blobs):
             return None
-        shade = self._ground_shadow.draw(view.faces, view.blobs[:, :2], matrix_bytes(matrix))
+        shade = self._ground_shadow.draw(view.faces, view.blobs[:, :2], matrix)
         if shade is not None:
             return shade
         gl.enable_only(gl.BLEND)
