@@ -13,11 +13,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fba.arrays import Float32, Int32, Intp, UInt8
+from fba.arrays import Float32, Float64, Int32, Intp, UInt8
 from fba.mesh.simplify import TOLERANCES, DetailLevels
 from fba.rotations import unit
 from fba_player._figure.face_light import KEY_DIRECTION
-from fba_player.gl._resources import RecentlyUsed, load_program, make_buffer, set_uniforms, write_buffer
+from fba_player.gl._resources import (
+    RecentlyUsed,
+    load_program,
+    make_buffer,
+    matrix_bytes,
+    set_uniforms,
+    write_buffer,
+)
 from fba_player.view._view import FaceMesh, FaceShape
 
 TEXELS = 256
@@ -40,8 +47,9 @@ BEYOND = 0.5
 """Metres by which it is wider than the feet are apart, at least."""
 SKY_REACH, KEY_REACH = 1.1, 0.8
 """Metres beyond what hides the sky, and beyond what hides the key light, up to which ground may be darker."""
-ALL: tuple[float, ...] = (0.0, 0.0, 1.0, 1.0)
-"""The whole ground: corner and size, as shares of it."""
+Part = tuple[float, ...]
+"""Of a square of ground: corner and size, as shares of it."""
+ALL: Part = (0.0, 0.0, 1.0, 1.0)
 ACROSS = unit(np.array([KEY_DIRECTION[2], 0.0, -KEY_DIRECTION[0]]))
 BEFORE = np.stack([ACROSS, np.cross(unit(np.array(KEY_DIRECTION)), ACROSS)], axis=1).astype(np.float32)
 """(3, 2): axes of the map that the key light sees, as in shaders/lighting.glsl."""
@@ -85,29 +93,29 @@ class GroundShadow:
             for name in ("shaded", "contact", "cast")
         }
 
-    def draw(self, meshes: list[FaceMesh], places: Float32, camera: bytes) -> Shade | None:
+    def draw(self, meshes: list[FaceMesh], places: Float32, camera: Float64) -> Shade | None:
         """Draw the shadow of meshes around `places` (N, 2), x and z, into the bound framebuffer.
 
-        camera: the matrix to clip space. Returns the map of shadows, or None if no mesh casts any.
+        camera: (4, 4), to clip space. Returns the map of shadows, or None if no mesh casts any.
         """
         casting = [mesh for mesh in meshes if _casts(mesh)]
         if not casting:
             return None
-        target, viewport = self._gl.fbo, self._gl.viewport
+        target, viewport, matrix = self._gl.fbo, self._gl.viewport, matrix_bytes(camera)
         low, width = _ground_around(places)
-        frame, part = self._find(casting, low, width)
+        frame, part = self._find(casting, low, width, camera)
+        corner, size = _ground_near(places)
+        near = _in_picture(ALL, corner, size, NEAR_CELLS, camera) if part and size <= 2 * CONTACT else None
+        if near:
+            self._darkness.use(3)
+            square = {"corner": corner, "size": size, "darkness": 3}
+            self._shade("contact", self._near, near, frame=frame, low=low, width=width, **square)
         target.use()
         self._gl.viewport = viewport
-        self._cast(self._darkness, camera=camera, low=low, width=width, part=part)
-        corner, size = _ground_near(places)
-        if size <= 2 * CONTACT:
-            self._darkness.use(3)
-            self._shade(
-                "contact", self._near, frame=frame, low=low, width=width, corner=corner, size=size, darkness=3
-            )
-            target.use()
-            self._gl.viewport = viewport
-            self._cast(self._contact, camera=camera, low=corner, width=size, part=ALL)
+        if part:
+            self._cast(self._darkness, camera=matrix, low=low, width=width, part=part)
+        if near:
+            self._cast(self._contact, camera=matrix, low=corner, width=size, part=ALL)
         return Shade(self._tops, frame)
 
     def _cast(self, map_: Any, **values: object) -> None:
@@ -119,13 +127,15 @@ class GroundShadow:
         set_uniforms(self._programs["cast"], darkness=2, contact=float(contact), **values)
         self._arrays["cast"].render(gl.TRIANGLE_STRIP)
 
-    def _shade(self, name: str, map_: Any, **values: object) -> None:
-        """Fill a map of darkness by one of the programs. values: of uniforms."""
+    def _shade(self, name: str, map_: Any, part: Part, **values: object) -> None:
+        """Fill a part of a map of darkness by one of the programs. values: of uniforms."""
+        map_.scissor = tuple(round(map_.width * share) for share in part)
         map_.use()
         self._gl.enable_only(self._gl.NOTHING)
         self._gl.viewport = (0, 0, *map_.size)
         set_uniforms(self._programs[name], tops=1, **values)
         self._arrays[name].render(self._gl.TRIANGLE_STRIP)
+        map_.scissor = None
 
     def darkness(self, meshes: list[FaceMesh], places: Float32) -> UInt8:
         """Return uint8 (CELLS, CELLS): the darkness of the ground that `draw` draws, rows along z."""
@@ -133,11 +143,12 @@ class GroundShadow:
         return np.frombuffer(self._darkness.read(alignment=1), np.uint8).reshape(CELLS, CELLS)
 
     def _find(
-        self, casting: list[FaceMesh], low: tuple[float, float], width: float
-    ) -> tuple[tuple[float, float, float], tuple[float, ...]]:
-        """Find the darkness of the ground from `low` on.
+        self, casting: list[FaceMesh], low: tuple[float, float], width: float, camera: Float64 | None = None
+    ) -> tuple[tuple[float, float, float], Part | None]:
+        """Find the darkness of the ground from `low` on, where the camera sees it; None: everywhere.
 
-        Returns the frame of the key light's map, and the part of the ground outside which there is no shadow.
+        Returns the frame of the key light's map, and the part of the ground outside which there is no
+        shadow, or None if none of it is in the picture.
         """
         import moderngl
 
@@ -146,11 +157,14 @@ class GroundShadow:
         if casting:
             points = self._place(casting, width > COARSE * WIDTH)
             frame, part = _frame_around(points), _dark_part(points, low, width)
+        seen = part if camera is None else _in_picture(part, low, width, CELLS, camera)
         set_uniforms(thrown, low=low, width=width, frame=frame)
         gl.enable_only(gl.BLEND)
         gl.blend_func = gl.ONE, gl.ONE
         gl.blend_equation = moderngl.MAX
         for sky, (texture, framebuffer) in enumerate(self._seen.items()):
+            if sky and not seen:
+                break
             framebuffer.use()
             gl.viewport = (0, 0, TEXELS, TEXELS)
             gl.clear(0.0, 0.0, 0.0, 0.0)
@@ -161,15 +175,15 @@ class GroundShadow:
             texture.filter = (gl.LINEAR_MIPMAP_NEAREST, gl.LINEAR)
             texture.use(1 - sky)
         gl.blend_equation = moderngl.FUNC_ADD
+        if not seen:
+            return frame, None
         self._shaded.use()
         gl.clear()
-        self._shaded.scissor = tuple(round(CELLS * share) for share in part)
-        self._shade("shaded", self._shaded, frame=frame, low=low, width=width)
-        self._shaded.scissor = None
+        self._shade("shaded", self._shaded, seen, frame=frame, low=low, width=width)
         return frame, part
 
     def _place(self, casting: list[FaceMesh], coarsely: bool) -> Float32:
-        """Write the places (N, 3) of all vertices, and return them.
+        """Write the places of all vertices, and return them: (3, N).
 
         coarsely: whether few triangles do, as each body covers little of the maps.
         All triangles are drawn at once: software OpenGL takes longer to begin a part than to draw it.
@@ -185,7 +199,7 @@ class GroundShadow:
         ]
         points = np.concatenate(places)
         write_buffer(self._thrown_parts[1], points)
-        return points
+        return np.ascontiguousarray(points.T)  # NumPy finds extremes of long rows faster
 
     def _join(self, shapes: list[tuple[FaceShape, bool]], parts: list[tuple[Intp, Int32]]) -> None:
         """Make the buffers for the casting vertices of all shapes, one after the other."""
@@ -233,22 +247,49 @@ def _casts(mesh: FaceMesh) -> bool:
 
 
 def _frame_around(points: Float32) -> tuple[float, float, float]:
-    """Return the corner of the square that the key light sees about points (N, 3), a metre's share of it."""
-    seen = points @ BEFORE
-    least, most = seen.min(axis=0), seen.max(axis=0)
+    """Return the corner of the square that the key light sees about points (3, N), a metre's share of it."""
+    seen = BEFORE.T @ points
+    least, most = seen.min(axis=1), seen.max(axis=1)
     width = FRAMED * float(np.ceil((most - least).max() / FRAMED + 0.4))
     u, v = (least + most) / 2 - width / 2  # not in whole texels: shadows would jump as a head turns
     return float(u), float(v), 1 / width
 
 
-def _dark_part(points: Float32, low: tuple[float, float], width: float) -> tuple[float, ...]:
-    """Return where points (N, 3) may darken the ground: corner and size, 0..1, in whole cells."""
-    below = points[:, ::2]
-    thrown = below - np.array(KEY_DIRECTION[::2], dtype=np.float32) / KEY_DIRECTION[1] * points[:, 1:2]
-    least = np.minimum(below.min(axis=0) - SKY_REACH, thrown.min(axis=0) - KEY_REACH)
-    most = np.maximum(below.max(axis=0) + SKY_REACH, thrown.max(axis=0) + KEY_REACH)
+def _dark_part(points: Float32, low: tuple[float, float], width: float) -> Part:
+    """Return where points (3, N) may darken the ground: corner and size, 0..1, in whole cells."""
+    below = points[::2]
+    thrown = below - np.array(KEY_DIRECTION[::2], dtype=np.float32)[:, None] / KEY_DIRECTION[1] * points[1]
+    least = np.minimum(below.min(axis=1) - SKY_REACH, thrown.min(axis=1) - KEY_REACH)
+    most = np.maximum(below.max(axis=1) + SKY_REACH, thrown.max(axis=1) + KEY_REACH)
     first, last = (np.clip((end - low) * CELLS / width, 0, CELLS) for end in (least, most))
     first, last = np.floor(first) / CELLS, np.ceil(last) / CELLS
+    return (*first.tolist(), *(last - first).tolist())
+
+
+def _in_picture(
+    part: Part, low: tuple[float, float], width: float, cells: int, camera: Float64
+) -> Part | None:
+    """Return what is in the picture of a part of a square of ground, in whole cells, one more on each side.
+
+    low, width: of the square. cells: along each of its sides. None if nothing is in the picture.
+    """
+    shares = np.array(part[:2]) + np.array(part[2:]) * [[0, 0], [1, 0], [1, 1], [0, 1]]
+    ground = np.insert(low + width * shares, 1, 0.0, axis=1)
+    corners = np.column_stack([shares, ground @ camera[:, :3].T + camera[:, 3]]).tolist()
+    for axis, sign in ((2, 1.0), (2, -1.0), (3, 1.0), (3, -1.0)):  # each side of the picture cuts the polygon
+        before, corners = corners, []
+        for one, other in zip(before, before[1:] + before[:1], strict=True):
+            inside, follows = one[5] + sign * one[axis], other[5] + sign * other[axis]
+            if inside >= 0:
+                corners.append(one)
+            if (inside >= 0) != (follows >= 0):
+                share = inside / (inside - follows)
+                corners.append([a + (b - a) * share for a, b in zip(one, other, strict=True)])
+    if not corners:
+        return None
+    places = np.array(corners)[:, :2] * cells
+    first = np.maximum((np.floor(places.min(axis=0)) - 1) / cells, part[:2])
+    last = np.minimum((np.ceil(places.max(axis=0)) + 1) / cells, np.add(part[:2], part[2:]))
     return (*first.tolist(), *(last - first).tolist())
 
 

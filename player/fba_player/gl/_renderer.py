@@ -122,10 +122,14 @@ class Renderer:
         pixel = camera.seen(size[1]).pixel
 
         gl.viewport = (0, 0, *size)
-        gl.clear(0.2, 0.2, 0.2, 1.0, depth=1.0)
         self._set_camera(tuple(eye.tolist()), matrix_bytes(matrix), pixel)
         drawn = replace(view, faces=self._details.choose(view.faces, eye, pixel, view.lod, now))
         shade = self._draw_studio(drawn, matrix, size, (float(camera.target[0]), float(camera.target[2])))
+        # As late as this, software OpenGL clears the depth with the pixels that it draws, tile by tile.
+        gl.fbo.color_mask = (False,) * 4
+        gl.fbo.clear(depth=1.0)
+        gl.fbo.color_mask = (True,) * 4
+        gl.fbo.use()  # else the mask would not change
         gl.enable_only(gl.DEPTH_TEST)
         for mesh in view.meshes:
             self._draw_mesh(mesh)
@@ -187,7 +191,7 @@ class Renderer:
         """
         gl = self._gl
         if view.background is not None:
-            gl.clear(*view.background, 1.0, depth=1.0)
+            gl.clear(*view.background, 1.0)
             return self._draw_shadows(view, matrix)
         target = gl.fbo
         key = (size, view.ground, matrix.tobytes(), centre)
@@ -216,7 +220,7 @@ class Renderer:
         blobs = np.ascontiguousarray(view.blobs[:MAX_BLOBS], dtype="f4")
         if not view.ground or not len(blobs):
             return None
-        shade = self._ground_shadow.draw(view.faces, view.blobs[:, :2], matrix_bytes(matrix))
+        shade = self._ground_shadow.draw(view.faces, view.blobs[:, :2], matrix)
         if shade is not None:
             return shade
         gl.enable_only(gl.BLEND)

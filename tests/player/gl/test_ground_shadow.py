@@ -84,27 +84,40 @@ def test_a_shadow_is_reproducible_and_nothing_casts_no_shadow(context: Any) -> N
     assert not Ground(context).darkness.any()
 
 
-def test_what_stands_on_the_ground_is_dark_at_its_foot_alone(context: Any) -> None:
-    """Seen from above, 1 cm a pixel: near feet the ground is drawn more finely than its map of darkness."""
+def draw_from_above(context: Any, height: float, at: tuple[float, float] = (0.0, 0.0)) -> Any:
+    """Return the white ground below a ball, 1 cm a pixel, a metre to each side of a place (x, z)."""
     size = 200
     target = context.simple_framebuffer((size, size))
-    from_above = np.zeros((4, 4), dtype=np.float32)
-    from_above[0, 0] = from_above[1, 2] = from_above[3, 3] = 1.0  # x and z, a metre to each side
+    camera = np.zeros((4, 4))
+    camera[0, 0] = camera[1, 2] = camera[3, 3] = 1.0
+    camera[:2, 3] = -np.array(at)
+    target.use()
+    target.clear(1.0, 1.0, 1.0, 1.0)
+    shadow = GroundShadow(context)
+    assert shadow.draw([ball(0.05, (0.0, height, 0.0))], np.zeros((3, 2), np.float32), camera)
+    shadow.close()
+    seen = np.frombuffer(target.read(components=1, alignment=1), np.uint8).reshape(size, size).astype(int)
+    target.release()
+    return seen
+
+
+def test_what_stands_on_the_ground_is_dark_at_its_foot_alone(context: Any) -> None:
+    """Near feet the ground is drawn more finely than its map of darkness."""
     rows = []
     for height in (0.04, 0.2):
-        target.use()
-        target.clear(1.0, 1.0, 1.0, 1.0)
-        shadow = GroundShadow(context)
-        assert shadow.draw(
-            [ball(0.05, (0.0, height, 0.0))], np.zeros((3, 2), np.float32), from_above.T.tobytes()
-        )
-        shadow.close()
-        seen = np.frombuffer(target.read(components=1, alignment=1), np.uint8).reshape(size, size).astype(int)
-        rows.append(seen[size // 2])
-        assert np.abs(np.diff(seen[:, : size // 4])).max() <= 2  # nothing to see at edges of maps
-    target.release()
+        seen = draw_from_above(context, height)
+        rows.append(seen[100])
+        assert np.abs(np.diff(seen[:, :50])).max() <= 2  # nothing to see at edges of maps
     touching, raised = rows
-    middle = size // 2
-    assert touching[middle] < 0.35 * 255
-    assert touching[middle] < raised[middle] - 60
-    assert touching[middle + 12] > 0.85 * 255  # 12 cm away, on the side of the light
+    assert touching[100] < 0.35 * 255
+    assert touching[100] < raised[100] - 60
+    assert touching[112] > 0.85 * 255  # 12 cm away, on the side of the light
+
+
+@pytest.mark.parametrize("at", [(90, 0), (-70, 90), (3, -104), (-96, -97), (140, 30), (600, 0)])
+def test_ground_partly_in_the_picture_is_as_dark_as_in_a_whole_one(context: Any, at: tuple[int, int]) -> None:
+    whole = np.pad(draw_from_above(context, 0.04), 700, mode="edge")  # the edge is white
+    x, z = at
+    part = draw_from_above(context, 0.04, (x / 100, z / 100))
+    inside = whole[700 + z :, 700 + x :][:200, :200]
+    assert np.abs(part - inside).max() <= 2

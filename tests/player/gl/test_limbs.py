@@ -48,7 +48,7 @@ def test_an_arm_before_a_wall_takes_its_key_light(context: Any, finely: bool) ->
         with_arm = [wall(), arm]
         target = context.simple_framebuffer((8, 8))
         target.use()
-        shade = shadow.draw(with_arm, np.zeros((1, 2), np.float32), np.eye(4, dtype=np.float32).tobytes())
+        shade = shadow.draw(with_arm, np.zeros((1, 2), np.float32), np.eye(4))
         assert shade is not None
         pictures.append(draw(context, wall(), shade._replace(finely=finely)))
         target.release()

@@ -5,6 +5,6 @@ in vec2 at;
 out vec4 pixel;
 
 void main() {
-    float seen = texture(darkness, at).r;
+    float seen = textureLod(darkness, at, 0.0).r;
     pixel = vec4(vec3(mix(1.0 - seen, seen, contact)), 1.0);  // what is left of the ground's light, or half
 }

@@ -44,7 +44,7 @@ void main() {
     float opaque = coordinates.z;
     vec3 albedo = vec3(1.0);
 #ifdef TEXTURED
-    vec4 texel = texture(picture, coordinates.xy);
+    vec4 texel = textureLod(picture, coordinates.xy, 0.0);
 #ifndef SOLID
     opaque *= texel.a;
     texel.rgb /= max(texel.a, 0.004); // colours of pictures with holes are multiplied by their alpha
@@ -60,7 +60,7 @@ void main() {
 #endif
 #ifdef WRINKLED
     vec2 spot = vec2(abs(wrinkle_place.x), wrinkle_place.y) * wrinkle_window.xy + wrinkle_window.zw;
-    float depth = dot(texture(wrinkle_map, spot) - 128.0 / 255.0, wrinkles) * 2.0;
+    float depth = dot(textureLod(wrinkle_map, spot, 0.0) - 128.0 / 255.0, wrinkles) * 2.0;
     albedo *= max(1.0 + DARKENS * depth, 0.2);
 #endif
 #ifdef FINELY
@@ -75,7 +75,7 @@ void main() {
     base -= (1.0 - lit) * keyed * albedo;
 #endif
 #ifdef FINE
-    vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
+    vec3 grain = (textureLod(relief, coordinates.xy * fine.y, 0.0).rgb - 0.5) * fine.x;
     base *= 1.0 + 0.40 * dot(grain, KEY_DIRECTION);
     n += grain;
 #endif
@@ -90,7 +90,7 @@ void main() {
     albedo *= colour.rgb;
     vec3 rough = n;
 #ifdef FINE
-    vec3 grain = (texture(relief, coordinates.xy * fine.y).rgb - 0.5) * fine.x;
+    vec3 grain = (textureLod(relief, coordinates.xy * fine.y, 0.0).rgb - 0.5) * fine.x;
     rough = normalize(n + grain);
     n = normalize(n + grain * 0.45);
 #endif

@@ -38,8 +38,8 @@ void main() {
         vec2 size = vec2(textureSize(picture, 0));
         vec2 here = gl_FragCoord.xy / size;
         vec2 by = along / size;
-        vec3 near_ = 0.5 * (texture(picture, here - by / 6.0).rgb + texture(picture, here + by / 6.0).rgb);
-        vec3 wide = 0.5 * near_ + 0.25 * (texture(picture, here - by * 0.5).rgb + texture(picture, here + by * 0.5).rgb);
+        vec3 near_ = 0.5 * (textureLod(picture, here - by / 6.0, 0.0).rgb + textureLod(picture, here + by / 6.0, 0.0).rgb);
+        vec3 wide = 0.5 * near_ + 0.25 * (textureLod(picture, here - by * 0.5, 0.0).rgb + textureLod(picture, here + by * 0.5, 0.0).rgb);
         float far_ = dot(wide, BRIGHTNESS);
         pixel = vec4(far_ < low || far_ > high ? near_ : wide, 1.0);
     }
