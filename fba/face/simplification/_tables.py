@@ -28,7 +28,7 @@ from fba.face.authoring.surface._motion import (
 from fba.face.authoring.surface._motion_limits import stop_at_folds
 from fba.face.authoring.surface.landmarks import CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
-from fba.face.checks._combined_rules import CLOSED, SIDES, SPLITS
+from fba.face.checks._combined_rules import CLOSED, MAX_LID_GAP, SIDES, SPLITS, lid_gap
 from fba.face.checks._fap_checks import (
     CORNER_RADIUS,
     EYE_CORNERS,
@@ -118,7 +118,8 @@ def fit_tables(
 
 
 def close_lids(face: FaceModel) -> tuple[FaceDefTables, ...]:
-    """Return the tables of a face, those of upper lids with margins that end on those of the lower lids.
+    """Return the tables of a face, those of upper lids with margins that end on those of the lower lids where
+    a gap is left.
 
     Their other vertices stay as they are: this is for gaps of a few percent of the iris.
     """
@@ -132,6 +133,8 @@ def close_lids(face: FaceModel) -> tuple[FaceDefTables, ...]:
         margin = poser.marks.contour(f"{side} upper lid")
         ways = np.zeros((len(values), len(surface) + 1, 3))
         for way, split in zip(ways[1:], values[1:], strict=True):
+            if lid_gap(poser, side, split) <= MAX_LID_GAP:
+                continue
             moved = poser.pose({upper: split, lower: CLOSED - split})
             line, other = (poser.contour(f"{side} {lid} lid", moved) for lid in ("upper", "lower"))
             other = other[np.argsort(other[:, 0], kind="stable")]
