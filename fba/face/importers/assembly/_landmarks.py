@@ -46,7 +46,7 @@ class Tuning:
     min_outside_z: float = 0.2  # z of normals; with less, skin is the inside of the mouth, or an ear
     max_in_column: int = 3000  # vertices of a column of the face that are compared with each other
     min_parted_share: float = 0.25  # lips part by at least this share of the jaw's motion
-    lip_slope: float = 0.05  # rise of a lip from the middle of a column, which does not make it the nearer one
+    lip_slope: float = 0.05  # by which a vertex must be nearer to the other lip to be farther aside
     max_half_mouth: float = 0.7  # width that half a mouth has at most, in distances of the eyes
     slit_step: float = 0.02  # width of a step along the line between the lips, in distances of the eyes
     slit_end: float = 0.15  # lips still part at the corner by this share of their gap in the middle
