@@ -149,11 +149,8 @@ def painted_height(positions: Float64, hair: Hair) -> Float64:
         return height
     # Along the parting, which ends softly on the crown, there is scalp as well.
     places = strand_places(positions)
-    wander = 0.0012 * noise(positions, 0.009, 67) + 0.0008 * noise(positions, 0.003, 68)
-    away = np.maximum(places.real * _metres(places) + wander, 0.0)
-    crossed = 0.005 * np.maximum(noise(positions, 0.005, 70), 0.0)  # by strands of the other side
-    parting = 0.008 + crossed + 6 * away + 0.010 * smoothstep((0.1 - np.cos(places.imag)) / 0.8)
-    return np.minimum(height, parting)
+    away = np.maximum(places.real * _metres(places) + 0.0008 * noise(positions, 0.003, 67), 0.0)
+    return np.minimum(height, 0.006 + 9 * away + 0.010 * smoothstep((0.1 - np.cos(places.imag)) / 0.8))
 
 
 def _cropped(positions: Float64) -> Float64:
