@@ -17,6 +17,8 @@ EDGE = np.array([0.66, 0.62, 0.54])
 """The edge of a crown, through which the dark behind it is seen."""
 CANINE = np.array([0.98, 0.94, 0.88])
 """Factors of the colour of canines, which are yellower."""
+UNDER_LIP = (0.28, 0.32, 0.34)
+"""Shares by which a crown is darker at its neck than at its edge."""
 UNEVEN = 0.05
 """Share by which teeth are darker or brighter than each other."""
 GUM = np.array([0.60, 0.225, 0.20])
@@ -125,9 +127,11 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     share = np.clip(rows / 1.0, 0, 1) ** 2
     # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
     shaded = (0.90, 0.86, 0.83) if sign > 0 else (0.88, 0.82, 0.79)
-    behind = np.array(shaded) ** (max(place - 2, 0) ** 1.15)
+    behind = np.array(shaded) ** (max(place - 1.4, 0) ** 1.15)
     behind *= 1 + UNEVEN * np.random.default_rng(place).uniform(-1, 1)
+    # Less light falls in under the lips.
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * behind
+    colour *= 1 - np.array(UNDER_LIP) * np.clip(rows[:, None], 0, 1)
     if place < 3:
         colour[:2] *= EDGE / ENAMEL * [[1.0], [1.04]]
     elif place == 3:

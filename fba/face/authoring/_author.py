@@ -23,6 +23,7 @@ from fba.face.authoring.regions.jaw import (
     TONGUE_FAPS,
     Jaw,
     find_jaw,
+    hollowing,
     jaw_share_of_part,
     opening_angles,
     opening_shifts,
@@ -240,8 +241,11 @@ class _Authoring:
             if part.kind in ("teeth", "tongue")
         ]
         points = self.marks.surface.vertices
-        moving = np.flatnonzero(jaw.share)
+        hollow = hollowing(self.marks)
+        moving = np.flatnonzero((jaw.share > 0) | hollow.any(axis=1))
         shifts = opening_shifts(points[moving], jaw, angles) * jaw.share[moving][:, None]
+        sunk = -opening_shifts(jaw.chin[None], jaw, angles)[:, :, 1:2]
+        shifts += sunk * hollow[moving]
         pinned = self.marks.on_contours(*LIP_CONTOURS)
         pinned[self.marks.vertices_of(CHIN)] = True
         motion = unfold(self.marks.surface, self.limiter, Motion(values, moving, shifts), pinned, True)

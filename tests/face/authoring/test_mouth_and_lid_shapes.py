@@ -7,6 +7,7 @@ from fba import figures
 from fba.face.authoring.regions._eye_opening import SETTLED, Opening, settle_fold
 from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.regions._lips import lip_motions
+from fba.face.authoring.regions.jaw import hollowing
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
@@ -28,6 +29,7 @@ def lips() -> tuple[Landmarks, dict[int, Motion]]:
         ((8, 55), "upper inner lip", "2.6", -300),
         ((10, 57), "lower inner lip", "2.8", 150),
         ((8, 55), "upper inner lip", "2.6", 150),
+        ((10, 57), "lower inner lip", "2.8", -700),  # a mouth wide open is an oval
     ],
 )
 def test_beside_the_corner_lips_move_in_an_arc(
@@ -44,6 +46,40 @@ def test_beside_the_corner_lips_move_in_an_arc(
     quarter = int(np.abs(length / until - 0.25).argmin())
     assert way[walk[0]] == pytest.approx(0, abs=1e-6)
     assert way[walk[quarter]] / way[own] > 1.4 * length[quarter] / until
+
+
+@pytest.mark.parametrize(
+    ("contour", "value"), [("upper inner lip", -200), ("lower inner lip", -200), ("lower inner lip", 200)]
+)
+def test_a_corner_leaves_the_arcs_beside_it_with_their_lips(
+    lips: tuple[Landmarks, dict[int, Motion]], contour: str, value: int
+) -> None:
+    marks, motions = lips
+    way = np.zeros(len(marks.surface))
+    for fap in (12, 59):
+        way[motions[fap].vertices] += motions[fap].shifts_at(value)[:, 1]
+    walk = marks.contour(contour)
+    steps = np.linalg.norm(np.diff(marks.surface.vertices[walk], axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    until = length[int(np.flatnonzero(walk == marks.vertex["2.6" if "upper" in contour else "2.8"])[0])]
+    quarter = int(np.abs(length / until - 0.25).argmin())
+    assert way[walk[quarter]] / way[walk[0]] < 0.75
+
+
+def test_cheeks_answer_to_corners_and_jaw(lips: tuple[Landmarks, dict[int, Motion]]) -> None:
+    marks, motions = lips
+    outward = {}
+    for fap in (53, 59):
+        motion = motions[fap]
+        along = (motion.shifts_at(300) * marks.surface.normals[motion.vertices]).sum(axis=1)
+        outward[fap] = along[~(marks.lips | marks.inside_mouth)[motion.vertices]]
+    assert outward[53].max() > 0.0005 < outward[59].max()
+    hollow = hollowing(marks)
+    depth = (hollow * marks.surface.normals).sum(axis=1)
+    assert -0.2 < depth.min() < -0.1
+    assert depth.max() == 0
+    for point in ("2.1", "5.3", "8.3", "2.4", "9.1", "10.7"):
+        assert np.linalg.norm(hollow[marks.vertex[point]]) < 0.02, point
 
 
 @pytest.mark.parametrize(("fap", "value"), [(5, -300), (4, -300), (53, 300)])

@@ -5,10 +5,8 @@ around them. The corners of a lip that opens are arcs, not the ends of a straigh
 what lies towards the inner contour, the outer FAP the rest; sent together, as they mostly are, they move the
 lip as a whole.
 
-A smile also slides corners that are drawn apart back round the teeth. Lips do not grow thin: their contours
-have FAPs of their own, and captures would find those moved. But between these, lips that open or stretch grow
-flatter. Corners that are raised push the cheek up into a bulge below the eye, beside which the fold from nose
-to mouth deepens.
+Lips do not grow thin: their contours have FAPs of their own, and captures would find those moved. But between
+these, lips that open or stretch grow flatter.
 """
 
 from __future__ import annotations
@@ -19,13 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Float64, Intp
+from fba.face.authoring.regions._smile import RAISING, STRETCHING, add_smile
 from fba.face.authoring.surface._fold_limits import Limiter
-from fba.face.authoring.surface._motion import Motion, ease_field, unfold
+from fba.face.authoring.surface._motion import Motion, ease_field, including, unfold
 from fba.face.authoring.surface._motion_limits import (
     coupled_motions,
     eased_linear_motion,
-    human_range,
-    soft_limit,
     stop_at_folds,
     values_to_reach,
 )
@@ -34,26 +31,6 @@ from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks
 from fba.parameters import faps
 from fba.sampling import smoothstep
 
-# What a smile does beside moving the corners of the mouth:
-STRETCHING = (6, 7, 53, 54)
-RAISING = {12: 1.0, 59: 1.0, 13: -1.0, 60: -1.0}
-"""Side of the corner that each FAP raises."""
-STRAIGHT = 100.0
-"""Value up to which a stretched corner goes straight to the side; then it meets the teeth."""
-BEND = 0.62
-"""From there on, its way back as a share of its way to the side."""
-BULGE = (0.62, 0.40)
-"""How far the cheek comes out, and up, as shares of the way of a raised corner."""
-FOLD = -0.27
-"""The same of the fold beside it."""
-CHEEK, FOLD_PLACE = ({"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265), ({"8.3": 0.62, "9.1": 0.38}, 0.12)
-"""Where they are: shares of feature points of the left side, and their breadth in ES0."""
-RIGHT = {"5.3": "5.4", "9.1": "9.2", "8.3": "8.4"}
-SMILE_NEAR, SMILE_REACH = 0.54, 0.78
-"""Distances from the corner of the mouth between which all that fades out, in ES0."""
-FOLD_OUTWARD = 0.09
-"""Distance of the fold outside of the line from nose to mouth, in ES0."""
-# The handles:
 HANDLES = {
     "left corner": ("2.4", "8.3"),
     "upper left": ("2.6", "8.5"),
@@ -87,18 +64,26 @@ ARCS = {
     55: "upper left", 56: "upper right", 57: "lower left", 58: "lower right",
 }  # fmt: skip
 """Handles beside the corners of the mouth, by the FAPs that make an arc between them."""
-ARC = (2.2, 0.0)
-"""How steep the arc begins on the inner and the outer contour, as shares of the motion of the handle."""
-ARC_VALUE = 300.0
-"""Value up to which the arc grows."""
+ARC = (1.5, 0.0)
+"""How high the arc is on the inner and the outer contour, as shares of the motion of the handle."""
+ARC_POWERS = (0.8, 2.4)
+"""How round it begins at the corner, and how flat it ends at the handle: nearly a quarter of an ellipse."""
+ARC_VALUES = (700.0, 600.0, 500.0, 400.0, 300.0, 200.0, 100.0)
+"""Values up to which the arc grows: the first at which no skin folds."""
+CORNER_ARCS = {"upper": (1.0, 0.7), "lower": (1.0, 0.6)}
+"""Shares of it that a corner takes back, lowered or raised: the arc is in the lip's way from its corner."""
 FLATTENS = dict.fromkeys((4, 5, 8, 9, 10, 11, 51, 52, 55, 56, 57, 58), -1.0) | dict.fromkeys(STRETCHING, 1.0)
 """FAPs that make the red of the lips flatter, and the sign of the values that do."""
 FLATTER, FLAT_VALUE = 0.07, 400.0
 """By how much, as a share of the way of the handle, and the value up to which that grows."""
 REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
-REACH_INSIDE = 0.3
+REACH_INSIDE = 0.5
 """Reach into the mouth, in ES0."""
+LEAST_ARC = 0.015
+"""What is less of an arc is left out."""
+CARRIED = 0.02
+"""Distance along the lips over which the arcs are evened out behind them, in ES0."""
 UNMOVED_POINTS = ("9.1", "9.2", "9.3", "9.4", "9.5", "9.15", "2.1", "10.7", "10.8", "3.9", "3.10")
 """Feature points that the lips do not move."""
 SLACK = 0.25
@@ -147,8 +132,9 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             pair = coupled_motions(limiter, (inner, inner), (outer, outer), number)
             motions[number], motions[mate] = pair
     for number in FLATTENS.keys() & motions.keys():
-        shaped = _with_shape(marks, lips, number, motions[number])
-        motions[number] = stop_at_folds(limiter, unfold(surface, limiter, shaped, pinned, False))
+        motions[number] = _flatter(marks, limiter, lips, number, motions[number])
+    for number in (ARCS | RAISING).keys() & motions.keys() & set(range(50)):
+        _add_arcs(marks, limiter, lips, number, motions)
     return {fap: add_smile(marks, limiter, fap, motion) for fap, motion in motions.items()}, lost
 
 
@@ -213,7 +199,7 @@ def _fields(marks: Landmarks) -> _Lips:
                 for name in arcs if not any(_twin(marks, point) for point in points) else ():
                     if name in handles:
                         away = np.minimum(np.abs(places - (4 if "right" in name else 0)), 1.0)
-                        values[walk, len(names) + arcs.index(name)] = ARC[number] * away * (1 - away) ** 3
+                        values[walk, len(names) + arcs.index(name)] = _arc(away, ARC[number])
     for name, pair in HANDLES.items():
         for point in pair:
             if marks.has(point) and not _twin(marks, point) and not np.isnan(values[marks.vertex[point], 0]):
@@ -227,12 +213,38 @@ def _fields(marks: Landmarks) -> _Lips:
     free = reachable_region(near, far, REACH * es)
     free &= ~marks.inside_mouth | (near < REACH_INSIDE * es)
     solved = solve_smooth_field(marks.surface, free, fixed, values[fixed], slack=SLACK * es)
-    shares = [trim_small(column) for column in solved.T]
+    solved[:, len(names) :] = _carry_inside(marks, solved[:, len(names) :])
+    shares, heights = solved.T[: len(names)], solved.T[len(names) :]
     return _Lips(
-        dict(zip(names, shares, strict=False)),
-        dict(zip(arcs, shares[len(names) :], strict=True)),
+        {name: trim_small(share) for name, share in zip(names, shares, strict=True)},
+        {name: trim_small(height, LEAST_ARC) for name, height in zip(arcs, heights, strict=True)},
         _inward(marks),
     )
+
+
+def _arc(away: Float64, height: float) -> Float64:
+    """Return (M,) what the arc adds at places from the corner, 0, to the handle, 1."""
+    return np.asarray(height * away ** ARC_POWERS[0] * (1 - away) ** ARC_POWERS[1])
+
+
+def _carry_inside(marks: Landmarks, arcs: Float64) -> Float64:
+    """Return arcs (N, K) that go on behind the lips as they are there, as a plate would end them too soon."""
+    surface, es = marks.surface, marks.fapu.ES * 1024
+    inside = np.flatnonzero(marks.inside_mouth & ~marks.on_inner_lips)
+    walks = [walk for half in ("upper", "lower") if len(walk := marks.contour(f"{half} inner lip"))]
+    if not len(inside) or len(walks) < 2:
+        return arcs
+    depths = [surface.distances(walk, limit=2 * REACH_INSIDE * es)[inside] for walk in walks]
+    depths = [np.minimum(depth, 2 * REACH_INSIDE * es) for depth in depths]
+    arcs = arcs.copy()
+    arcs[inside] = 0.0
+    for walk, depth, other in zip(walks, depths, depths[::-1], strict=True):
+        away = np.linalg.norm(surface.vertices[inside][:, None] - surface.vertices[walk], axis=2)
+        near = np.exp(-(((away - away.min(axis=1, keepdims=True)) / (CARRIED * es)) ** 2))
+        own = smoothstep(0.5 + (other - depth) / (4 * CARRIED * es))
+        own *= 1 - smoothstep(depth / (REACH_INSIDE / 2 * es))
+        arcs[inside] += own[:, None] * (near @ arcs[walk]) / near.sum(axis=1, keepdims=True)
+    return arcs
 
 
 def _inward(marks: Landmarks) -> Float64:
@@ -302,85 +314,62 @@ def smooth_weights(x: Float64, count: int) -> Float64:
     return weights
 
 
-def _with_shape(marks: Landmarks, lips: _Lips, fap: int, motion: Motion) -> Motion:
-    """Return the motion with the arc beside a corner of the mouth, and with lips that grow flatter."""
-    inner = fap < 50
-    if fap in ARCS:
-        arc = lips.arc[ARCS[fap]] * (lips.inward if inner else 1 - lips.inward)
-        motion = _adding(motion, arc[:, None] * marks.step(fap), (-ARC_VALUE, ARC_VALUE))
+def _flatter(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motion: Motion) -> Motion:
+    """Return the motion with lips that grow flatter."""
     between = 4 * lips.inward * (1 - lips.inward) * np.clip(_fap_field(lips, fap), 0.0, 1.0)
     size = float(np.linalg.norm(marks.step(fap))) * FLATTENS[fap] * FLATTER / 2
     flatter = trim_small(between)[:, None] * -size * marks.surface.normals
     low, high = sorted((0.0, FLATTENS[fap] * FLAT_VALUE))
-    return _adding(motion, flatter, (low, high))
+    shaped = _adding(motion, flatter, (low, high))
+    pinned = marks.on_contours(*LIP_CONTOURS)
+    return stop_at_folds(limiter, unfold(marks.surface, limiter, shaped, pinned, False))
+
+
+def _add_arcs(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motions: dict[int, Motion]) -> None:
+    """Add the arcs beside a corner of the mouth to the motion of an inner FAP, in place.
+
+    Where they would fold its skin, which the outer contour leaves no more room, they go on with its mate.
+    """
+    pinned = marks.on_contours(*LIP_CONTOURS)
+    for sign, field in zip((-1.0, 1.0), _arc_fields(marks, lips, fap), strict=True):
+        done = 0.0
+        for number in (fap, faps()[fap - 1].lip_mate or fap):
+            for most in ARC_VALUES if number in motions else ():
+                if most <= done:
+                    break
+                low, high = sorted((sign * done, sign * most))
+                shaped = _adding(motions[number], field, (low, high))
+                shaped = unfold(marks.surface, limiter, shaped, pinned, False)
+                if _is_sound(limiter, shaped):
+                    motions[number], done = shaped, most
+                    break
+
+
+def _is_sound(limiter: Limiter, motion: Motion) -> bool:
+    patch = limiter.patch(motion.vertices)
+    return all(patch.is_sound(limiter.spread(motion.vertices, shifts)) for shifts in motion.shifts)
+
+
+def _arc_fields(marks: Landmarks, lips: _Lips, fap: int) -> tuple[Float64, Float64]:
+    """Return (N, 3) what arcs add for each unit of value below 0, and above.
+
+    A corner moves away from under the arcs beside it, which stay with their lips.
+    """
+    shares = {ARCS[fap]: (1.0, 1.0)} if fap in ARCS else {}
+    if fap in RAISING:
+        side = "left" if RAISING[fap] > 0 else "right"
+        shares = {f"{lip} {side}": (-low, -high) for lip, (low, high) in CORNER_ARCS.items()}
+    field = np.zeros((2, len(lips.inward)))
+    for name, share in shares.items():
+        field += np.array(share)[:, None] * lips.arc[name] * lips.inward
+    low, high = field[:, :, None] * marks.step(fap)
+    return low, high
 
 
 def _adding(motion: Motion, field: Float64, ends: tuple[float, float]) -> Motion:
     """Return the motion with value x field (N, 3) of the surface added, for values between two ends."""
-    motion = _including(motion, np.flatnonzero(field.any(axis=1)))
+    motion = including(motion, np.flatnonzero(field.any(axis=1)))
     values = np.union1d(motion.values, np.clip(ends, motion.values[0], motion.values[-1]))
-    ways = np.clip(values, *ends)[:, None, None]
+    ways = (np.clip(values, *ends) - np.clip(0.0, *ends))[:, None, None]
     shifts = np.stack([motion.shifts_at(value) for value in values]) + ways * field[motion.vertices]
     return Motion(values, motion.vertices, shifts)
-
-
-def add_smile(marks: Landmarks, limiter: Limiter, fap: int, motion: Motion) -> Motion:
-    """Return the motion of the corner of the mouth by a FAP with what goes along; others as they are."""
-    if fap in STRETCHING:
-        return stop_at_folds(limiter, _stretched(_with_knot(motion)))
-    if fap in RAISING:
-        return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], outer=fap > 50))
-    return motion
-
-
-def _with_knot(motion: Motion) -> Motion:
-    """Return the same motion with `STRAIGHT` among its values."""
-    values = np.union1d(motion.values, [min(STRAIGHT, motion.values[-1])])
-    return Motion(values, motion.vertices, np.stack([motion.shifts_at(value) for value in values]))
-
-
-def _stretched(motion: Motion) -> Motion:
-    """Return a stretch that bends round the teeth."""
-    shifts = motion.shifts.copy()
-    apart = np.abs(motion.shifts[..., 0]) * (motion.values > 0)[:, None]
-    shifts[..., 2] -= BEND * np.maximum(apart - np.abs(motion.shifts_at(STRAIGHT)[:, 0]), 0.0)
-    return Motion(motion.values, motion.vertices, shifts)
-
-
-def _with_cheek(marks: Landmarks, motion: Motion, side: float, *, outer: bool) -> Motion:
-    """Return a raised corner with the cheek's bulge, of which the outer contour's FAP has the most."""
-    surface, es = marks.surface, marks.fapu.ES * 1024
-    share = 0.8 if outer else 0.2
-    corner = marks.point_or_average("8.3" if side > 0 else "8.4")
-    away = np.linalg.norm(surface.vertices - corner, axis=1) / es
-    near = smoothstep((SMILE_REACH - away) / (SMILE_REACH - SMILE_NEAR)) * ~(marks.inside_mouth | marks.lips)
-    field = np.zeros((len(surface), 3))
-    for (points, breadth), (out, up), beside in (
-        (CHEEK, BULGE, 0.0),
-        (FOLD_PLACE, (FOLD, 0.0), FOLD_OUTWARD),
-    ):
-        names = {name if side > 0 else RIGHT[name]: part for name, part in points.items()}
-        centre = np.sum([part * marks.point_or_average(name) for name, part in names.items()], axis=0)
-        centre[0] += side * beside * es
-        distance = np.linalg.norm(surface.vertices - centre, axis=1)
-        weight = near * np.exp(-((distance / (breadth * es)) ** 2))
-        field += weight[:, None] * (out * surface.normals + (0.0, up, 0.0))
-    field *= share
-    motion = _including(motion, np.flatnonzero(field.any(axis=1)))
-    raised = _ways(motion.values, 12) * marks.fapu.MNS
-    shifts = motion.shifts + raised[:, None, None] * field[motion.vertices]
-    return Motion(motion.values, motion.vertices, shifts)
-
-
-def _ways(values: Float64, fap: int) -> Float64:
-    """Return the values (K,) of a FAP, slowed where human faces end."""
-    most = human_range(fap)
-    return np.array([soft_limit(value, most[int(value > 0)]) for value in values])
-
-
-def _including(motion: Motion, more: Intp) -> Motion:
-    """Return the same motion with further vertices, which stay where they are."""
-    vertices = np.union1d(motion.vertices, more)
-    shifts = np.zeros((len(motion.values), len(vertices), 3))
-    shifts[:, np.searchsorted(vertices, motion.vertices)] = motion.shifts
-    return Motion(motion.values, vertices, shifts)

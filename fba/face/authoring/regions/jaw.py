@@ -43,6 +43,9 @@ class Tuning:
     # share of a sliding jaw's motion that the lower lip makes. An opening jaw does not move the lip, which
     # has FAPs of its own.
     lip_ride: float = 0.5
+    # where the cheek hollows between the jaws: shares of feature points of each side, its breadth in ES0, and
+    # its depth as a share of the way of the chin
+    hollow: tuple[float, float, float] = (0.7, 0.26, 0.16)
     slack: float = 0.2  # distance in ES0 beyond which the skin does not overshoot
     min_share: float = 0.004  # shares of a motion below this are set to 0
     teeth_margin: float = 0.12  # height about the teeth's edge where the jaw's share goes from 0 to 1, MNS0
@@ -115,6 +118,20 @@ def opening_shifts(points: Float64, jaw: Jaw, angles: Float64) -> Float64:
     zero = np.zeros((len(angles), len(points)))
     forward, down = (step * jaw.size * angles[:, None] for step in TUNING.hinge_slide)
     return np.stack([zero, y * cos - z * sin - y - down, y * sin + z * cos - z + forward], axis=-1)
+
+
+def hollowing(marks: Landmarks) -> Float64:
+    """Return (N, 3) how far the skin of the cheeks goes in for each metre by which the chin sinks."""
+    surface = marks.surface
+    front, breadth, depth = TUNING.hollow
+    result = np.zeros((len(surface), 3))
+    for names in (("5.1", "2.13"), ("5.2", "2.14")):
+        if marks.has(*names):
+            centre = front * marks.point(names[0]) + (1 - front) * marks.point(names[1])
+            away = np.linalg.norm(surface.vertices - centre, axis=1) / (breadth * marks.fapu.ES * 1024)
+            weight = trim_small(np.exp(-(away**2)), TUNING.min_share) * ~(marks.inside_mouth | marks.lips)
+            result -= depth * weight[:, None] * surface.normals
+    return result
 
 
 def bite_height(marks: Landmarks) -> float:

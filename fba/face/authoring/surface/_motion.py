@@ -48,6 +48,14 @@ class Motion:
         return np.asarray(self.shifts[k] * (1 - share) + self.shifts[k + 1] * share)
 
 
+def including(motion: Motion, more: Intp) -> Motion:
+    """Return the same motion with further vertices, which stay where they are."""
+    vertices = np.union1d(motion.vertices, more)
+    shifts = np.zeros((len(motion.values), len(vertices), 3))
+    shifts[:, np.searchsorted(vertices, motion.vertices)] = motion.shifts
+    return Motion(motion.values, vertices, shifts)
+
+
 def fap_limits(fap: int) -> tuple[float, float]:
     """Return the smallest and largest value that a stream can carry with the finest quantiser step."""
     entry = faps()[fap - 1]

@@ -46,9 +46,10 @@ class Tuning:
     min_outside_z: float = 0.2  # z of normals; with less, skin is the inside of the mouth, or an ear
     max_in_column: int = 3000  # vertices of a column of the face that are compared with each other
     min_parted_share: float = 0.25  # lips part by at least this share of the jaw's motion
+    lip_slope: float = 0.05  # by which a vertex must be nearer to the other lip to be farther aside
     max_half_mouth: float = 0.7  # width that half a mouth has at most, in distances of the eyes
     slit_step: float = 0.02  # width of a step along the line between the lips, in distances of the eyes
-    slit_end: float = 0.1  # lips still part at the corner by this share of their gap in the middle
+    slit_end: float = 0.15  # lips still part at the corner by this share of their gap in the middle
     min_loop_vertices: int = 6  # number of vertices that the opening of an eye has around it at least
     # distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils
     front_teeth: float = 0.12
@@ -398,6 +399,7 @@ def _lip_pair(
         return None
     half = (falls[above] + falls[below]) / 2
     around = between[above] < reach * apart
-    upper = np.where(around & (falls < half), positions[:, 1], np.inf)
-    lower = np.where(around & (falls >= half), positions[:, 1], -np.inf)
+    aside = TUNING.lip_slope * np.abs(positions[:, 0] - x)  # of two as near to the other lip, the one at x
+    upper = np.where(around & (falls < half), positions[:, 1] + aside, np.inf)
+    lower = np.where(around & (falls >= half), positions[:, 1] - aside, -np.inf)
     return int(column[int(upper.argmin())]), int(column[int(lower.argmax())])
