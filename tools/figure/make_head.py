@@ -199,7 +199,7 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     inside = near & (ring < 0)
     # The throat is darker than the cheeks.
     cheek = smoothstep((np.abs(surface.vertices[:, 0]) - 0.012) / 0.018)
-    depth = smoothstep((0.002 - z) / 0.060) * (1 - 0.75 * cheek)
+    depth = smoothstep((0.012 - z) / 0.060) * (1 - 0.5 * cheek)
     depth = np.maximum(depth, 0.15 * smoothstep((-ring - 0.5) / 3.5)) * inside
     colours[:, :3] *= 1 - depth[:, None] * (0.62, 0.74, 0.74)
     colours[:, 3] *= np.where(

@@ -30,7 +30,7 @@ UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
-SINKING = np.array([0.0, 0.0, 0.3, 1.5, 3.4, 6.2, 8.8]) / 1000
+SINKING = np.array([0.0, 0.0, 0.2, 0.9, 2.4, 4.8, 7.4]) / 1000
 """Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides them."""
 SUNK_GUM = 0.4
 """Share of that by which their gum is deeper: so low a crown is short, too."""
@@ -126,7 +126,7 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
     # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
-    shaded = (0.90, 0.86, 0.83) if sign > 0 else (0.88, 0.82, 0.79)
+    shaded = (0.90, 0.86, 0.83) if sign > 0 else (0.85, 0.79, 0.75)
     behind = np.array(shaded) ** (max(place - 1.4, 0) ** 1.15)
     behind *= 1 + UNEVEN * np.random.default_rng(place).uniform(-1, 1)
     # Less light falls in under the lips.

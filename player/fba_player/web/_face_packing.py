@@ -29,7 +29,7 @@ from fba_player.web._look_packing import pack_face_light, pack_wrinkles
 
 STEP = 1e-5
 """Metres: positions are multiples of it."""
-SHAPE_STEP = 2e-5
+SHAPE_STEP = 1.8e-5
 """Metres: shapes are multiples of it."""
 SHAPE_ERROR = 2e-5
 """Largest error of a vertex's shift by one FAP within its borders, in metres along each axis."""
@@ -319,17 +319,16 @@ def shifts_at_borders(mesh: FaceDefMesh, chosen: Int64, unit: float) -> tuple[Fl
 def factorise(shifts: Float64, error: float, step: float) -> tuple[Float64, Float64]:
     """Return curves (R, K) and shapes (R, N, 3), multiples of a step, whose products are shifts (K, N, 3).
 
-    No number is off by more than `error`, as far as rounding to steps allows.
+    No number is off by more than `error` and what rounding adds, which further shapes would add to.
     """
     flat = shifts.reshape(len(shifts), -1)
     left, sizes, right = np.linalg.svd(flat, full_matrices=False)
     for count in range(len(sizes) + 1):
         curves, modes = left[:, :count], sizes[:count, None] * right[:count]
-        scale = np.abs(curves).max(axis=0, initial=0.0)
-        curves, modes = (curves / scale).T, modes * scale[:, None]
-        modes = np.rint(modes / step) * step
-        if np.abs(curves.T @ modes - flat).max(initial=0.0) <= error:
+        if np.abs(curves @ modes - flat).max(initial=0.0) <= error:
             break
+    scale = np.abs(curves).max(axis=0, initial=0.0)
+    curves, modes = (curves / scale).T, np.rint(modes * scale[:, None] / step) * step
     return curves, modes.reshape(count, *shifts.shape[1:])
 
 

@@ -28,6 +28,7 @@ from fba_player._figure.face import FaceFigure, build_figure
 from fba_player._figure.model_units import prepare_model, resize
 from fba_player._figure.person import Person, build_person
 from fba_player.view._geometry import rotation_vector, transform
+from fba_player.web._face_packing import factorise
 from fba_player.web._packing import Packed, pack_figure
 from gltf_edits import edit
 from small_people import write_person
@@ -81,6 +82,14 @@ UP = np.array([0.0, 1.0, 0.0])
 
 def test_its_tables_are_those_of_the_standard() -> None:
     assert make_tables.FIGURE_TARGET.read_text(encoding="utf-8") == make_tables.make_figure_tables()
+
+
+def test_motion_is_packed_as_few_shapes() -> None:
+    random = np.random.default_rng(1)
+    shifts = np.einsum("kr,rnc->knc", random.uniform(-1, 1, (9, 2)), random.uniform(-0.01, 0.01, (2, 500, 3)))
+    curves, shapes = factorise(shifts + random.uniform(-5e-6, 5e-6, shifts.shape), 2e-5, 2e-5)
+    assert len(shapes) == 2
+    assert np.abs(np.tensordot(curves, shapes, axes=(0, 0)) - shifts).max() < 4e-5
 
 
 @dataclass

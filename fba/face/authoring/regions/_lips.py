@@ -80,7 +80,7 @@ REACH = 0.75
 """Reach of the lips' motion into the face, in ES0."""
 REACH_INSIDE = 0.5
 """Reach into the mouth, in ES0."""
-LEAST_ARC = 0.015
+LEAST_ARC = 0.03
 """What is less of an arc is left out."""
 CARRIED = 0.02
 """Distance along the lips over which the arcs are evened out behind them, in ES0."""

@@ -1,7 +1,7 @@
 """What corners of the mouth do beside moving their points, above all in a smile.
 
-Corners that are drawn apart slide back round the teeth. Those and corners that are raised push the cheek up
-into a bulge below the eye, beside which the fold from nose to mouth deepens.
+Corners that are drawn apart slide back round the teeth. Corners that are raised push the cheek up into a
+bulge below the eye, beside which the fold from nose to mouth deepens.
 """
 
 from __future__ import annotations
@@ -25,9 +25,7 @@ BEND = 0.62
 """From there on, its way back as a share of its way to the side."""
 BULGE = (0.72, 0.42)
 """How far the cheek comes out, and up, as shares of the way of a raised corner."""
-STRETCHED_CHEEK = 0.35
-"""The part of that which a corner that is drawn to the side makes."""
-FOLD = -0.27
+FOLD = -0.20
 """The same of the fold beside it."""
 CHEEK, CHEEK_BREADTH = {"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265
 """Where the bulge is: shares of feature points of the left side, and its breadth in ES0."""
@@ -38,7 +36,7 @@ SMILE_NEAR, SMILE_REACH = 0.54, 0.78
 """Distances from the corner of the mouth between which all that fades out, in ES0."""
 CORNER_STILL = 0.10
 """Distance from the corner of the mouth up to which it does not, in ES0."""
-LEAST_CHEEK = 0.03
+LEAST_CHEEK = 0.08
 """What is less of the bulge and the fold is left out."""
 FOLD_OUTWARD = 0.09
 """Distance of the fold outside of the line from nose to mouth, in ES0."""
@@ -47,13 +45,9 @@ FOLD_OUTWARD = 0.09
 def add_smile(marks: Landmarks, limiter: Limiter, fap: int, motion: Motion) -> Motion:
     """Return the motion of the corner of the mouth by a FAP with what goes along; others as they are."""
     if fap in STRETCHING:
-        ways = STRETCHED_CHEEK * marks.fapu.MW * np.maximum(_ways(_with_knot(motion).values, fap), 0.0)
-        side = 1.0 if fap in (6, 53) else -1.0
-        motion = _with_cheek(marks, _stretched(_with_knot(motion)), side, ways, outer=fap > 50)
-        return stop_at_folds(limiter, motion)
+        return stop_at_folds(limiter, _stretched(_with_knot(motion)))
     if fap in RAISING:
-        ways = _ways(motion.values, 12) * marks.fapu.MNS
-        return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], ways, outer=fap > 50))
+        return stop_at_folds(limiter, _with_cheek(marks, motion, RAISING[fap], outer=fap > 50))
     return motion
 
 
@@ -71,11 +65,8 @@ def _stretched(motion: Motion) -> Motion:
     return Motion(motion.values, motion.vertices, shifts)
 
 
-def _with_cheek(marks: Landmarks, motion: Motion, side: float, ways: Float64, *, outer: bool) -> Motion:
-    """Return a corner's motion with the cheek's bulge, of which the outer contour's FAP has the most.
-
-    ways: (K,) metres of the corner at the motion's values.
-    """
+def _with_cheek(marks: Landmarks, motion: Motion, side: float, *, outer: bool) -> Motion:
+    """Return a raised corner with the cheek's bulge, of which the outer contour's FAP has the most."""
     surface, es = marks.surface, marks.fapu.ES * 1024
     share = 0.8 if outer else 0.2
     corner = marks.point_or_average("8.3" if side > 0 else "8.4")
@@ -85,11 +76,11 @@ def _with_cheek(marks: Landmarks, motion: Motion, side: float, ways: Float64, *,
     bulge = _near_segment(marks, side, (CHEEK, CHEEK), 0.0) / CHEEK_BREADTH
     fold = _near_segment(marks, side, FOLD_ENDS, FOLD_OUTWARD) / FOLD_BREADTH
     bulge, fold = (near * trim_small(np.exp(-(distance**2)), LEAST_CHEEK) for distance in (bulge, fold))
-    cheek = share * bulge[:, None] * (BULGE[0] * surface.normals + (0.0, BULGE[1], 0.0))
-    crease = share * FOLD * fold[:, None] * surface.normals
-    motion = including(motion, np.flatnonzero(cheek.any(axis=1) | crease.any(axis=1)))
-    ways = ways[:, None, None]
-    shifts = motion.shifts + ways * cheek[motion.vertices] + np.maximum(ways, 0.0) * crease[motion.vertices]
+    field = bulge[:, None] * (BULGE[0] * surface.normals + (0.0, BULGE[1], 0.0))
+    field = share * (field + FOLD * fold[:, None] * surface.normals)
+    motion = including(motion, np.flatnonzero(field.any(axis=1)))
+    raised = _ways(motion.values, 12) * marks.fapu.MNS
+    shifts = motion.shifts + raised[:, None, None] * field[motion.vertices]
     return Motion(motion.values, motion.vertices, shifts)
 
 
