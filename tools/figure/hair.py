@@ -72,7 +72,7 @@ DEEP = (-0.7, -0.62)
 REACH, SCALE, SOFT = 3.25, 900, 2.0
 """Extent of `strand_places` away from the parting; pixels to a unit of them; pixels of blur."""
 WITHIN = (-0.375, -0.125, 0.125, 0.375)
-"""Shares of a texel at which strands are looked up: on top of the head they are thinner than texels are high."""
+"""Shares of a texel at which strands are looked up: on top of the head they are thinner than a texel."""
 SPARSER = 16
 """One of so many points is enough to tell where locks grow."""
 
