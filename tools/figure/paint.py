@@ -261,7 +261,7 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     crease = np.where(upper, np.exp(-(((ring - 7.7) / 0.55) ** 2)), 0.0)
     crease *= smoothstep((x - 21.0) / 5.0) * (1 - smoothstep((x - 39.0) / 5.0))
     colour = _blend(colour, np.array(looks.socket), 0.30 * thin)
-    colour = _blend(colour, np.array(looks.socket) * 0.80, 0.42 * crease)
+    colour = _blend(colour, np.array(looks.socket) * 0.80, 0.28 * crease)
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.55, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.20, line)
