@@ -71,6 +71,8 @@ DEEP = (-0.7, -0.62)
 """Tones between strands of straight and of curly hair."""
 REACH, SCALE, SOFT = 3.25, 900, 2.0
 """Extent of `strand_places` away from the parting; pixels to a unit of them; pixels of blur."""
+WITHIN = (-0.375, -0.125, 0.125, 0.375)
+"""Shares of a texel at which strands are looked up: on top of the head they are thinner than a texel."""
 SPARSER = 16
 """One of so many points is enough to tell where locks grow."""
 
@@ -111,7 +113,7 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
     # Locks end in a rounded edge, but hair of the nape grows thinner downwards.
     nape = smoothstep((-0.105 - folded[:, 2]) / 0.03) * smoothstep((0.02 - folded[:, 1]) / 0.03)
     share = np.clip(above / (hair.rise * (1 + nape)), 0.0, 1.0)
-    share = (share * (2 - share)) ** (0.6 + 0.4 * nape) * smoothstep((above - 0.002) / 0.010)
+    share = (share * (2 - share)) ** (0.6 + 0.4 * nape) * smoothstep((above - 0.005) / 0.010)
     return vertices + unit(vertices - MIDDLE) * (share * np.maximum(full, DEEPEST))[:, None]
 
 
@@ -149,8 +151,10 @@ def painted_height(positions: Float64, hair: Hair) -> Float64:
         return height
     # Along the parting, which ends softly on the crown, there is scalp as well.
     places = strand_places(positions)
-    away = np.maximum(places.real * _metres(places) + 0.0008 * noise(positions, 0.003, 67), 0.0)
-    return np.minimum(height, 0.006 + 9 * away + 0.010 * smoothstep((0.1 - np.cos(places.imag)) / 0.8))
+    away = places.real * _metres(places) + 0.0012 * noise(positions, 0.004, 67)
+    crossed = 0.006 * np.maximum(noise(positions, 0.006, 68), 0.0)  # by strands of the other side
+    behind = 0.010 * smoothstep((0.95 - np.cos(places.imag)) / 0.7)
+    return np.minimum(height, 0.006 + crossed + behind + 6 * np.maximum(away, 0.0))
 
 
 def _cropped(positions: Float64) -> Float64:
@@ -203,25 +207,40 @@ def _map_axes() -> tuple[Float64, Float64, Float64, float]:
     return ahead, np.cross(middle, ahead), middle, float(front @ ahead / (1 + front @ middle))
 
 
-def paint_locks(p: Float64, hair: Hair) -> tuple[Float64, Float64]:
-    """Return (N,) how bright hair is at points (N, 3), about -1..1, and (N,) how much of them it covers."""
-    above, places = painted_height(p, hair), strand_places(p)
+def paint_locks(p: Float64, step: Float64, hair: Hair) -> tuple[Float64, Float64]:
+    """Return (N,) how bright hair is at points (N, 3), about -1..1, and (N,) how much of them it covers.
+
+    step: (N, 3), how far the texel of a point reaches along the strands' least resolved direction.
+    """
+    above = painted_height(p, hair)
     picture = _draw_locks(_sow_locks(p, above, hair), hair)
-    at = np.stack([places.real, places.imag + np.pi]) * SCALE
-    drawn, cover = (map_coordinates(values, at, order=1) for values in picture)
+    drawn, cover = np.mean([_look_up(picture, p + share * step) for share in WITHIN], axis=0)
     # Between strands one sees deep into full hair, but the skin where it is sparse.
     gaps = (1 - cover) * smoothstep((above - 0.002) / THINNING)
     cover = cover + gaps
     # Single hairs at the edge are finer than a texel.
     thin = 0.55 + 0.45 * smoothstep(above / THINNING)
-    tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
+    places = strand_places(p)
+    deep = DEEP[int(hair.curly)] * (1 if hair.curly else smoothstep(places.real * _metres(places) / 0.006))
+    tone = (drawn + gaps * deep) / np.maximum(cover, 0.02)
     if not hair.curly:
-        # Light from above glances off the strands where they turn down.
-        rise = unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69)
-        shine = np.exp(-(((rise - 0.74) / 0.14) ** 2))
-        tone = tone * (1 + 0.3 * shine) + 0.40 * shine
+        bright = shine(unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69))
+        tone = tone * (1 + 0.3 * bright) + 0.40 * bright
     ears = (np.abs(p[:, 0]) > EARS[0]) & (p[:, 1] < EARS[1])
     return tone, np.where(ears, 0.0, cover * thin)
+
+
+def shine(rise: Float64) -> Float64:
+    """Return (N,), 0..1, how far light from above glances off hair that lies `rise` up the head, -1..1."""
+    return np.exp(-(((rise - 0.74) / 0.14) ** 2))
+
+
+def _look_up(picture: tuple[Float64, Float64], p: Float64) -> tuple[Float64, Float64]:
+    """Return (N,) what the two pictures of `_draw_locks` hold at points (N, 3)."""
+    places = strand_places(p)
+    at = np.stack([places.real, places.imag + np.pi]) * SCALE
+    drawn, cover = (map_coordinates(values, at, order=1) for values in picture)
+    return drawn, cover
 
 
 def _metres(places: Complex128) -> Float64:
@@ -248,7 +267,7 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
     long = smoothstep((unit(places - MIDDLE)[:, 1] - 0.1) / 0.7)
     full = smoothstep(height / THINNING)
     normal, uniform = random.normal, random.uniform
-    tone = normal(0, 0.20, count) + 0.2 * noise(places, 0.016, 63)
+    tone = normal(0, 0.24, count) + 0.2 * noise(places, 0.016, 63)
     if hair.curly:
         length, width = uniform(0.013, 0.023, count) * (0.4 + 0.6 * full), uniform(0.0019, 0.0033, count)
         heading = uniform(-np.pi, np.pi, count)
@@ -275,7 +294,7 @@ def _draw_locks(locks: Locks, hair: Hair) -> tuple[Float64, Float64]:
     each = np.repeat(np.arange(len(locks.roots)), STRANDS)
     full, length = locks.fullness[each], locks.lengths[each] * random.uniform(0.65, 1.1, len(each))
     across = random.uniform(-1, 1, len(each))
-    tone = locks.tones[each] - 0.35 * across**2 + random.normal(0, 0.17, len(each))
+    tone = locks.tones[each] - 0.35 * across**2 + random.normal(0, 0.22, len(each))
     path, widths, at = [], [], locks.roots[each]
     at = at + (1 - full) * random.uniform(-0.006, 0.006, len(each)) / _metres(at)
     side = 1j * across * locks.widths[each] / 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hair import MIDDLE, RADIUS, TONES, height_above_hairline, noise, strand_places, strand_points
+from hair import MIDDLE, RADIUS, TONES, height_above_hairline, noise, shine, strand_places, strand_points
 from looks import ALEX, Hair
 from meshes import Mesh, blade_triangles, join
 
@@ -14,8 +14,8 @@ SEGMENTS = 2
 GLOSS = 0.1
 GROUPS = (
     # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
-    ("front", 70, (0.005, 0.030), (0.016, 0.028), 0.00070, 0.0030),
-    ("crown", 90, (0.026, 1.0), (0.014, 0.026), 0.00070, 0.0032),
+    ("front", 70, (0.004, 0.022), (0.018, 0.034), 0.00150, 0.0050),
+    ("crown", 90, (0.026, 1.0), (0.016, 0.030), 0.00110, 0.0040),
 )
 NEIGHBOURS = 8
 """Vertices between which the depth of the layer is interpolated."""
@@ -39,7 +39,7 @@ def locks(bare: Float64, grown: Float64, triangles: Integer, hair: Hair) -> Mesh
             lifts = -lifts if name == "front" else lifts  # hidden: single curls would look like scratches
         paths = _paths(roots, length, bend, lifts, depth)
         blades += [_blade(path, width * random.uniform(0.6, 1.3)) for path in paths]
-        colours += list(_colours(random.normal(0.15, 0.20, count)))
+        colours += list(_colours(random.normal(0.10, 0.20, count) + 0.4 * shine(unit(roots - MIDDLE)[:, 1])))
     pattern = blade_triangles(SEGMENTS)
     return join([(b, pattern, np.tile(c, (len(b), 1))) for b, c in zip(blades, colours, strict=True)])
 

@@ -19,6 +19,8 @@ SIZE = 2048
 
 MOUTH = np.array([158, 76, 72.0])
 """sRGB, 0..255."""
+MAX_STEP = 0.003
+"""Metres: farther apart than this, texels are on both sides of a seam."""
 HAIR_WIDTH = 0.00023
 """Metres."""
 BROW_STROKES = ((1600, 0.0), (700, 0.25))
@@ -100,7 +102,7 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     colour = _eyes(colour, p, ring_eye, looks)
     colour = _mouth(colour, p, ring_mouth, lip_side, looks)
     colour = _ears(colour, p)
-    colour = _hair(colour, p, looks)
+    colour = _hair(colour, p, _texel_steps(chart), looks)
     colour = _blend(colour, np.array(looks.brow), 0.22 * brow(p, looks.brow_height)[1])
     image = np.zeros((*chart.known.shape, 3))
     image[chart.known] = colour
@@ -111,12 +113,18 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     return Image.fromarray(filled.astype(np.uint8))
 
 
-def _hair(colour: Float64, p: Float64, looks: Looks) -> Float64:
+def _texel_steps(chart: Chart) -> Float64:
+    """Return (N, 3) metres from each known texel to the one below it; 0 at seams."""
+    step = np.gradient(chart.positions_at, axis=0)[chart.known]
+    return np.where(np.linalg.norm(step, axis=1, keepdims=True) < MAX_STEP, step, 0.0)
+
+
+def _hair(colour: Float64, p: Float64, step: Float64, looks: Looks) -> Float64:
     """Return the colour with the hair of the head: strands that thin out towards their tips."""
     above = painted_height(p, looks.hair)
     near = above > -0.02
     p, above, hair = p[near], above[near], looks.hair
-    tone, cover = paint_locks(p, hair)
+    tone, cover = paint_locks(p, step[near], hair)
     strands = np.stack([np.interp(tone, TONES, [c[k] for c in hair.colours]) for k in range(3)], axis=1)
     # Through sparse hair skin is seen, in the shade.
     below = _blend(colour[near], np.array(looks.scalp), smoothstep((above + 0.006) / 0.020) * 0.85)
@@ -253,7 +261,7 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     crease = np.where(upper, np.exp(-(((ring - 7.7) / 0.55) ** 2)), 0.0)
     crease *= smoothstep((x - 21.0) / 5.0) * (1 - smoothstep((x - 39.0) / 5.0))
     colour = _blend(colour, np.array(looks.socket), 0.30 * thin)
-    colour = _blend(colour, np.array(looks.socket) * 0.80, 0.42 * crease)
+    colour = _blend(colour, np.array(looks.socket) * 0.80, 0.28 * crease)
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.55, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.20, line)

@@ -33,6 +33,8 @@ TEETH_FILL_SHARE = 0.56
 """Share of the missing light that is added on teeth when the mouth is open."""
 UPPER_LIDS, CLOSED = (19, 20), 1024
 """FAPs of the upper lids, and the value that closes them."""
+LID_MOVED = 0.005
+"""Motion of a closed lid's vertices, in ES0, from which they have the light of closed eyes."""
 LIDS_REACH = 0.35
 """Distance from the pupils, in ES0, within which light depends on the lids."""
 CLOSING_SKY = 0.45
@@ -236,7 +238,7 @@ class FaceLight:
         return Baked(shut, Visibility(*arrays), near, (self._gap(still), self._gap(moved)))
 
     def _lit_lids(self, shut: Visibility, triangles: Int32) -> Visibility:
-        """Return visibility with that of closed eyes where more light falls on the lids then: folds open."""
+        """Return visibility with that of closed eyes where lids move: skin from a fold is lit then."""
         eyes = self._model.points[[point_rows()["3.5"], point_rows()["3.6"]]]
         if not np.isfinite(eyes).all():
             return shut
@@ -245,8 +247,9 @@ class FaceLight:
         faps[[lid - 1 for lid in UPPER_LIDS]] = CLOSED
         away = np.linalg.norm(still[:, None] - eyes, axis=2).min(axis=1)
         near = away < LIDS_REACH * self._model.fapu.ES * 1024
-        closed = cached_visibility(*self._posed(faps), triangles, near)
-        more = near & (closed.open > shut.open)
+        posed = self._posed(faps)
+        closed = cached_visibility(*posed, triangles, near)
+        more = near & (np.linalg.norm(posed[0] - still, axis=1) > LID_MOVED * self._model.fapu.ES * 1024)
         arrays = (
             np.where(more[:, None] if old.ndim == 2 else more, new, old)
             for old, new in zip(shut, closed, strict=True)

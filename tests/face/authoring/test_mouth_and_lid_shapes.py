@@ -1,16 +1,18 @@
-"""What lips and lids do beside moving their feature points: arcs, flatter lips, a fold that settles."""
+"""What lips and lids do beside moving their feature points: arcs, flatter lips, a fold that stretches."""
 
 import numpy as np
 import pytest
 
 from fba import figures
-from fba.face.authoring.regions._eye_opening import SETTLED, Opening, settle_fold
+from fba.face.authoring.regions._eye_opening import STRETCHED, stretch_fold
 from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.regions._lips import lip_motions
 from fba.face.authoring.regions.jaw import hollowing
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion
 from fba.face.authoring.surface.landmarks import Landmarks, find_landmarks, weld_skin
+from fba.face.authoring.surface.surface import weld_parts
+from fba.face.model import Part
 
 
 @pytest.fixture(scope="module")
@@ -91,19 +93,25 @@ def test_lips_that_open_or_stretch_grow_flatter_between_their_contours(
     assert motion.shifts_at(-value)[red, 2].min() > -1e-6 or fap == 53
 
 
-def test_the_fold_above_a_closing_lid_settles_on_the_eyeball() -> None:
-    x = np.linspace(-0.012, 0.012, 65)
-    line = np.stack([np.full(65, 0.005), np.full(65, 0.011)], axis=1)
-    opening = Opening(x, line, line * (-1, 1))
-    eye = Eye("left", ("eye",), np.zeros(3), 0.0123, np.array([0, 0, 0.0123]), measured=True)
-    points = np.array([[0, 0.006, 0.0165], [0, 0.006, 0.0165], [0, 0.006, 0.0165], [0, 0.002, 0.0130]])
-    share = np.array([0.5, 1.0, 0.0, 0.5])
-    shifts = np.zeros((3, 4, 3))
-    shifts[1, :, 1], shifts[2, :, 1] = -0.5 * share * 0.010, -share * 0.010
-    settled = settle_fold(points, shifts, share, opening, eye)
-    assert (settled[0] == 0).all()  # an open eye stays as it is
-    np.testing.assert_array_equal(
-        settled[:, 1:], shifts[:, 1:]
-    )  # margins, still skin, and what lies on the ball
-    away = np.linalg.norm(points[0] + settled[:, 0], axis=1) / eye.radius
-    assert away[1] > away[2] == pytest.approx(SETTLED, abs=1e-6)
+def test_the_fold_above_a_closing_lid_is_stretched_out() -> None:
+    """A ridge across a sheet that a lid pulls down: gone when it is closed, and nothing else moves."""
+    across, down = np.meshgrid(np.arange(21) * 0.001, np.arange(25) * 0.001)
+    ridge = 0.002 * np.exp(-(((down - 0.012) / 0.002) ** 2))
+    vertices = np.stack([across, -down, ridge], axis=-1).reshape(-1, 3)
+    corner = (np.arange(24)[:, None] * 21 + np.arange(20)).ravel()
+    halves = [corner[:, None] + (0, 21, 22), corner[:, None] + (0, 22, 1)]
+    sheet = weld_parts([Part("skin", "skin", vertices, np.concatenate(halves).astype(np.int32))])
+    share = np.clip((sheet.vertices[:, 1] + 0.004) / -0.016, 0.0, 1.0)
+    moving = np.flatnonzero(share > 0)
+    ways = np.array([-0.5, 0.0, 0.5, 1.0])
+    shifts = np.zeros((4, len(moving), 3))
+    shifts[..., 1] = -0.003 * ways[:, None] * share[moving]
+    eye = Eye("left", ("eye",), np.array([0.010, -0.012, -0.040]), 0.012, np.zeros(3), measured=True)
+    stretched = stretch_fold(sheet, share, moving, shifts, ways, eye)
+    np.testing.assert_array_equal(stretched[:2], shifts[:2])  # of an eye that is open, or wide open
+    edge = share[moving] >= STRETCHED[1]
+    np.testing.assert_array_equal(stretched[:, edge], shifts[:, edge])
+    heights = (sheet.vertices[moving] + stretched)[..., 2].max(axis=1)
+    assert heights[1] == pytest.approx(0.002)
+    assert heights[2] == pytest.approx(0.001, abs=2e-4)
+    assert heights[3] < 2e-4

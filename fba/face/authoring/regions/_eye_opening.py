@@ -12,10 +12,12 @@ import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
 from fba.face.authoring.regions._eyes import Eye
+from fba.face.authoring.surface._weights import solve_smooth_field
 from fba.face.authoring.surface.landmarks import Landmarks
 from fba.face.authoring.surface.surface import Surface, positions_in
 from fba.face.eyeball import polar
 from fba.face.model import Part
+from fba.rotations import unit
 from fba.sampling import smoothstep
 
 LIDS = {19: ("left", "upper"), 20: ("right", "upper"), 21: ("left", "lower"), 22: ("right", "lower")}
@@ -37,14 +39,14 @@ MAX_DIP_CORRECTION = 0.02
 """Largest correction for an edge that dips into the eyeball, as a share of its radius."""
 BRIDGING_PASSES = 3
 """Number of passes: moving a vertex off the eyeball may pull another edge into it."""
-SETTLED = 1.21
-"""Radii of the eyeball beyond which the skin above an upper lid sinks as the lid closes over the ball."""
-SETTLING = ((0.0, 0.22), (0.75, 1.0))
-"""Shares of the margin's motion between which that fades in, and between which it fades out again."""
-MOST_SETTLED = 0.25
-"""How far it sinks at most, in radii of the eyeball."""
-WIDE = (0.35, 0.8)
-"""Heights of the opening, as shares of its largest, between which that begins and is full."""
+STRETCHED = (0.02, 0.7)
+"""Shares of the margin's motion between which the skin of a closed upper lid is stretched."""
+OUTER = 1.05
+"""Radii of the eyeball beyond which there is the outside of a lid, not its lining."""
+PLATE_RINGS = 3
+"""Rings of vertices around it whose positions say how it bends at its edge."""
+SLACK = 0.01
+"""Metres over which it is stiff, see `solve_smooth_field`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,20 +132,28 @@ def slide_lid(
     return shifts
 
 
-def settle_fold(points: Float64, shifts: Float64, share: Float64, opening: Opening, eye: Eye) -> Float64:
-    """Return the shifts (K, N, 3) of an upper lid that closes, with the skin of its fold sunk to the eyeball.
+def stretch_fold(
+    surface: Surface, share: Float64, vertices: Intp, shifts: Float64, ways: Float64, eye: Eye
+) -> Float64:
+    """Return the shifts (K, M, 3) of an upper lid with the skin above its edge stretched as it closes.
 
-    share: (N,), share of the margin's motion at each point. It sinks with the way that it has gone.
+    Closed, that skin is smooth like a bent plate, without ridges of the fold that it came out of. share:
+    (N,), share of the margin's motion at each vertex of the surface. vertices: (M,), those that move. ways:
+    (K,), 1 where the eye is closed.
     """
-    (start, full), (last, end) = SETTLING
-    window = smoothstep((share - start) / (full - start)) * (1 - smoothstep((share - last) / (end - last)))
-    gap = np.interp(points[:, 0], opening.x, opening.upper[:, 0] - opening.lower[:, 0])
-    wide = smoothstep((gap / gap.max() - WIDE[0]) / (WIDE[1] - WIDE[0]))
-    arms = points + shifts - eye.centre
-    away = np.linalg.norm(arms, axis=2)
-    gone = np.clip(-shifts[..., 1] / np.maximum(share * gap, 1e-9), 0.0, 1.0)
-    sinks = np.clip(away - SETTLED * eye.radius, 0.0, MOST_SETTLED * eye.radius) * gone * window * wide
-    return np.asarray(shifts - arms * (0, 1, 1) * (sinks / away)[:, :, None])
+    closed = surface.vertices.copy()
+    closed[vertices] += shifts[np.abs(ways - 1).argmin()]
+    outwards = unit(closed - eye.centre)
+    arms = surface.vertices - eye.centre
+    outer = (np.linalg.norm(arms, axis=1) > OUTER * eye.radius) & (arms[:, 2] > 0)
+    free = outer & (share > STRETCHED[0]) & (share < STRETCHED[1])
+    near = free
+    for _ in range(PLATE_RINGS):
+        near = near | surface.mask(surface.edges[near[surface.edges].any(axis=1)].ravel())
+    fixed = np.flatnonzero(near & ~free)
+    smooth = solve_smooth_field(surface, free, fixed, closed[fixed], slack=SLACK)
+    raised = np.where(free, ((smooth - closed) * outwards).sum(axis=1), 0.0)
+    return np.asarray(shifts + smoothstep(ways)[:, None, None] * (raised[:, None] * outwards)[vertices])
 
 
 @dataclass(frozen=True, eq=False)

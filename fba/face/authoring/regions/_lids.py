@@ -22,8 +22,8 @@ from fba.face.authoring.regions._eye_opening import (
     measure_profile,
     push_edges_outside,
     push_vertices_outside,
-    settle_fold,
     slide_lid,
+    stretch_fold,
 )
 from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.surface._fold_limits import Limiter
@@ -141,7 +141,7 @@ def lid_motion(
         motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
     else:
         if lid == "upper" and not follows:
-            shifts = settle_fold(points, shifts, share[vertices], opening, eye)
+            shifts = stretch_fold(marks.surface, share, vertices, shifts, values / CLOSED, eye)
         profile = measure_profile(eye, parts, edge_length(marks, own, other))
         # margins that lie in the eyeball, or close to it, meet where they are
         sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > MAX_SUNK * profile.size
