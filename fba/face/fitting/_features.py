@@ -2,8 +2,8 @@
 
 A whole face is found by a template of gradients (N. Dalal and B. Triggs, "Histograms of oriented gradients",
 2005), its points by a cascade of linear regressions on gradients (X. Xiong and F. De la Torre, "Supervised
-descent method", 2013), pupils by brightness as in Karpouzis, section 7.3. His templates with eigenvectors, of
-the whole face and of single points, and his Gabor phases missed more.
+descent method", 2013). The templates with eigenvectors of Karpouzis, section 7.3, of the whole face and of
+single points, his Gabor phases, and his darkest column and row for the pupils missed more.
 `tools/photos/learn_features.py` makes the data.
 """
 

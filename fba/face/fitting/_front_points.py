@@ -1,8 +1,8 @@
 """`find_front_points`: the feature points of a face on a frontal photograph.
 
 The whole face is found first; then, from each place like one, a cascade of regressions moves the points of a
-mean face to where gradients around them say, from the best place several times; pupils
-and brows last, by brightness.
+mean face to where gradients around them say, from the best place several times; then all go to where the
+likeliest head has them, and brows along the dark ridge above the lids.
 """
 
 from __future__ import annotations
@@ -26,8 +26,11 @@ from fba.face.fitting._features import (
     whole_likeness,
 )
 from fba.face.fitting._found import FoundPoints, Step
+from fba.face.fitting._head import DISTANCE
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS
+from fba.face.fitting._views import Observation, first_view, solve
+from fba.parameters import point_rows
 
 LARGEST = 0.5
 """Largest distance between the pupils that is looked for, as a share of the picture's smaller side."""
@@ -60,8 +63,9 @@ DOUBT = {"eyes": 0.02, "brows": 0.027, "nose": 0.03, "mouth": 0.027, "chin": 0.0
 """Spread of several tries beyond which the points of a part are doubtful, in distances between the pupils.
 
 More than in any of 40 pictures of other heads on which the part was found; of brows, where they were."""
-PUPIL = 5
-"""Pixels of a face of standard size around a pupil in which it is looked for."""
+USUAL_ERROR, DOUBTED = 0.0015, 2.0
+"""Error of points that are found, metres on the face, and how much more for each metre that tries are apart:
+chosen on rendered heads from which nothing was learned."""
 
 
 def find_front_points(photograph: Photograph) -> FoundPoints:
@@ -80,12 +84,13 @@ def find_front_points(photograph: Photograph) -> FoundPoints:
         Step("From the points of a mean face to those of this one", _draw(face, features().mean, places))
     )
     at, spread = _found_again(grey, middle, across)
+    at = _likely(at, spread)
     middle, across = standard_frame(at, features().mean)
     face = standard_face(grey, middle, across)
     colours = np.stack([standard_face(photograph.pixels[..., k] / 255, middle, across) for k in range(3)])
-    places = follow_brows(colours, _with_pupils(face, to_standard(at, middle, across)))
+    places = follow_brows(colours, to_standard(at, middle, across))
     steps.append(
-        Step("The middle of ten tries; pupils and brows by their brightness", _draw(face, None, places))
+        Step("The middle of ten tries as a likely head shows it; brows by colour", _draw(face, None, places))
     )
     at = from_standard(places, middle, across) * photograph.scale
     found = {name: (float(x), float(y)) for name, (x, y) in zip(FRONT_POINTS, at, strict=True)}
@@ -244,25 +249,19 @@ def _turned_back(place: Float64, shape: tuple[int, ...], degrees: float) -> tupl
     return turn @ (place - centre) + centre, turn[:, 0]
 
 
-def _with_pupils(face: Float64, places: Float64) -> Float64:
-    """Return places (P, 2) with the pupils at the darkest column and row (integral projections) near them."""
-    result = places.copy()
-    smooth = gaussian_filter(face, 1.0)
-    reach = PUPIL
-    for row in (FRONT_POINTS.index("3.5"), FRONT_POINTS.index("3.6")):
-        x, y = np.round(places[row]).astype(int)
-        window = smooth[y - reach : y + reach + 1, x - reach - 1 : x + reach + 2]
-        if window.shape != (2 * reach + 1, 2 * reach + 3):
-            continue
-        # V(x) = sum of I over y, H(y) = sum of I over x; only as far as the iris is wide
-        columns, rows = window.sum(axis=0), window.sum(axis=1)
-        dark = (columns.max() - columns) ** 2, (rows.max() - rows) ** 2
-        if min(one.sum() for one in dark) <= 0:
-            continue
-        right = float((dark[0] * np.arange(len(columns))).sum() / dark[0].sum()) - reach - 1
-        down = float((dark[1] * np.arange(len(rows))).sum() / dark[1].sum()) - reach
-        result[row] += np.clip([x + right, y + down] - places[row], -2, 2) * 0.5
-    return result
+def _likely(at: Float64, spread: Float64) -> Float64:
+    """Return places (P, 2), pixels, moved to those of the likeliest head that a camera may show there.
+
+    spread: how far tries are apart, in distances between the pupils. Where they are, other points say more.
+    """
+    from fba.face.builtin import default
+
+    points, rows = default().points, [point_rows()[name] for name in FRONT_POINTS]
+    eyes = float(np.linalg.norm(points[rows[0]] - points[rows[1]]))
+    seen = Observation(rows, at)
+    view = first_view(points, seen, DISTANCE)
+    head, views = solve(points, [view], [seen], noise=np.hypot(USUAL_ERROR, DOUBTED * spread * eyes))
+    return views[0].project(head[rows])
 
 
 def _draw(face: Float64, before: Float64 | None, places: Float64) -> UInt8:

@@ -101,14 +101,15 @@ def solve(
     seen: Sequence[Observation],
     *,
     rigid: bool = False,
-    noise: float = NOISE,
+    noise: float | Float64 = NOISE,
     hidden: bool = False,
 ) -> tuple[Float64, list[View]]:
     """Return (points (84, 3), views): the most likely head near a template that the views show as observed.
 
     Gauss-Newton over views and shape at once; the shape differs from the template smoothly and nearly alike
     on both sides (see `SPREADS`). rigid: the shape is known. noise: error of the observed places, metres on
-    the face. hidden: whether points that no view shows are estimated, too; otherwise they are NaN.
+    the face, or of each place if there is one view. hidden: whether points that no view shows are estimated,
+    too; otherwise they are NaN.
     """
     rows = sorted({row for one in seen for row in one.rows})
     if hidden:
@@ -128,9 +129,10 @@ def solve(
             at = np.array([number[row] for row in one.rows])
             off = one.places - view.project(base[at] + moved[at])
             by_point, by_view = _slopes(view, base[at] + moved[at])
-            error = np.linalg.norm(off, axis=1) / (noise * view.scale)
+            usual = noise * view.scale
+            error = np.linalg.norm(off, axis=1) / usual
             limit = ROBUST * max(float(np.median(error)), 1.0)
-            weight = np.minimum(1.0, limit / np.maximum(error, 1e-12)) / (noise * view.scale) ** 2
+            weight = np.minimum(1.0, limit / np.maximum(error, 1e-12)) / usual**2
             whole = np.zeros((len(at), 2, count))
             if size:
                 for axis in range(3):

@@ -11,7 +11,8 @@ from fba import Animation, FaceTrack, player
 from fba.arrays import Float64, UInt8
 from fba.errors import FbaWarning, ModelError
 from fba.face import FaceModel
-from fba.face.fitting import FoundPoints, Photograph, find_front_points, find_side_points
+from fba.face.fitting import FRONT_POINTS, FoundPoints, Photograph, find_front_points, find_side_points
+from fba.face.fitting._front_points import _likely
 from fba.parameters import point_rows
 
 SIZE = (300, 360)
@@ -35,6 +36,20 @@ def errors(found: FoundPoints, true: Float64, unit: float) -> dict[str, float]:
     return {
         name: float(np.hypot(*(np.array(at) - true[row[name]]))) / unit for name, at in found.points.items()
     }
+
+
+@pytest.mark.parametrize(("spread", "left", "others"), [(0.005, 0.6, 0.05), (0.05, 0.1, 0.01)])
+def test_a_point_that_no_likely_head_has_there_goes_back_the_more_the_more_tries_differ(
+    spread: float, left: float, others: float
+) -> None:
+    true = FaceModel.default().points[[point_rows()[name] for name in FRONT_POINTS], :2] * (1000, -1000)
+    eyes, own = float(np.linalg.norm(true[0] - true[1])), FRONT_POINTS.index("4.5")
+    wrong, spreads = true.copy(), np.full(len(true), 0.005)
+    wrong[own, 1] += 0.15 * eyes
+    spreads[own] = spread
+    before, after = (np.linalg.norm(at - true, axis=1) / eyes for at in (wrong, _likely(wrong, spreads)))
+    assert after[own] < left * before[own]
+    assert np.delete(after, own).max() < others
 
 
 @pytest.mark.slow
