@@ -48,12 +48,12 @@ lids closed with a broad grin, the lips apart with wide eyes, and the lips pushe
 and lids that meet half way."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-IMPORTANCE = 100.0
+IMPORTANCE = 140.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
-LID_SHARE = 5.0
+LID_SHARE = 6.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
-EYE_SHARE = 0.35
+EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
 LASH_SHARE = 0.5
 """The same for lashes: a hair has little area, yet its lack is seen."""
