@@ -29,7 +29,7 @@ from fba_player.web._look_packing import pack_face_light, pack_wrinkles
 
 STEP = 1e-5
 """Metres: positions are multiples of it."""
-SHAPE_STEP = 1.8e-5
+SHAPE_STEP = 1.85e-5
 """Metres: shapes are multiples of it."""
 SHAPE_ERROR = 2e-5
 """Largest error of a vertex's shift by one FAP within its borders, in metres along each axis."""
@@ -39,7 +39,7 @@ TEXTURE_BYTES = 60_000
 """Pictures with more bytes are stored smaller."""
 TEXTURE_SIZE = 1024
 """Pixels that the wider side of such a picture keeps."""
-TEXTURE_QUALITY = 50
+TEXTURE_QUALITY = 45
 COORDINATE_STEP = 1 / 8192
 SWAY_STEP = 1 / 8192
 HAIR_STEP = 1 / 127

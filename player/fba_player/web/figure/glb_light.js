@@ -15,6 +15,9 @@ const [PIXEL, MOST_PIXELS] = [0.002, 300]; // of depth maps, metres
 const MOST_SHADED = 100_000; // vertices; on larger heads light is free
 const MOST_DRAWN = 5_000_000; // pixels of a depth map, each time that one is drawn
 const LEAST_SWAY = 0.05; // of vertices that are shaded: others do not go with the head
+/** FAPs of closed eyes. @type {Record<number, number>} */
+const LIDS_CLOSED = { 19: 1024, 20: 1024 };
+const LID_MOVED = 0.008; // of closed lids' vertices that are lit like this, times the nose's length
 /** FAPs of a mouth so wide open that light falls in. @type {Record<number, number>} */
 const MOUTH_OPEN = { 3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700, 51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700 };
 
@@ -33,6 +36,12 @@ export function bakeLight(header, lips, nose) {
   const baked = bake(face, triangles, shaded);
   shaded.forEach((vertex, at) => shut.set(baked.subarray(COLUMNS * at, COLUMNS * at + COLUMNS), COLUMNS * vertex));
   const gap = () => Math.hypot(...[0, 1, 2].map((axis) => face.positions[3 * lips[0] + axis] - face.positions[3 * lips[1] + axis]));
+  const still = Float32Array.from(face.positions);
+  face.pose(Float64Array.from({ length: 68 }, (_, column) => LIDS_CLOSED[column + 1] ?? 0));
+  // Lids keep the light that falls on them closed: skin that comes out of a fold is lit then.
+  const lids = shaded.filter((vertex) => Math.hypot(...[0, 1, 2].map((axis) => face.positions[3 * vertex + axis] - still[3 * vertex + axis])) > LID_MOVED * nose);
+  bake(face, triangles, lids).forEach((value, at) => (shut[COLUMNS * lids[Math.floor(at / COLUMNS)] + (at % COLUMNS)] = value));
+  face.pose(new Float64Array(68));
   const common = { shut, basis: SOFTNESS.flatMap((share, row) => SOFTNESS.map((_, column) => (row === column ? share : 0))), visible: HARMONICS, reach: 0.12 * nose };
   if (!lips.length || !small) return { ...common, lips: [], gaps: [0, 1], near: new Uint32Array(0), wide: new Float32Array(0) };
   const closed = gap();
