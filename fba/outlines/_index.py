@@ -23,7 +23,7 @@ from fba.limits import DEFAULT_LIMITS, Limits
 from fba.outlines._distance import Ground, earth_movers_distance, lower_bounds, outline_distances, project
 from fba.outlines._figure import Figure, read_poses
 from fba.outlines._index_file import CANVAS, Stored, Stream, pack_mask, read_index, unpack_mask, write_index
-from fba.outlines._mask import fit_mask
+from fba.outlines._mask import fit_mask, without_specks
 from fba.outlines._methods import describe_points
 from fba.outlines._raster import View, draw_silhouette
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, bap_angles
@@ -234,8 +234,8 @@ def build_index(
         for frame in frames:
             vertices = figure.vertices(poses.faps[frame], poses.baps[frame])
             for view in views:
-                # A lock of hair that ends between pixels leaves a row empty: fit again, as queries are.
-                mask = fit_mask(draw_silhouette(vertices, figure.triangles, view))
+                # Locks of hair leave specks, holes and empty rows: cut out and fit, as queries are.
+                mask = fit_mask(without_specks(draw_silhouette(vertices, figure.triangles, view)))
                 masks.append(pack_mask(mask))
                 descriptions.append(describe_points(mask))
                 if progress is not None:

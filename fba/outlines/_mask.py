@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 
-from fba.arrays import Bool, Float32, UInt8
+from fba.arrays import Bool, Float32, Int32, Intp, UInt8
 from fba.errors import FormatError, warn
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import naming_file, open_source
@@ -169,21 +169,39 @@ def _without_shadow(mask: Bool, colours: Float32, background: Float32) -> Bool:
     return result
 
 
+def without_specks(mask: Bool) -> Bool:
+    """Return the mask of the largest figure alone, its smallest holes filled; one of no figure as it is."""
+    labels, areas = _label(mask)
+    return _cut_figure(labels, areas) if areas.any() else mask
+
+
 def _single_figure(mask: Bool) -> Bool:
     """Return the mask of the only figure, without specks; FormatError for none or several."""
+    labels, areas = _label(mask)
+    if not areas.any():
+        raise FormatError("shows no figure before a background: it is all of one colour, or transparent")
+    figures = int((areas >= SECOND * areas.max()).sum())
+    if figures > 1:
+        raise FormatError(f"shows {figures} figures that do not touch; cut out the one that is meant")
+    figure = _cut_figure(labels, areas)
+    fit_mask(figure)  # its size
+    return figure
+
+
+def _label(mask: Bool) -> tuple[Int32, Intp]:
+    """Return which figure each pixel belongs to (H, W), and their areas; 0 for what is none."""
     from scipy import ndimage
 
     labels, count = ndimage.label(mask, np.ones((3, 3)))
-    if not count:
-        raise FormatError("shows no figure before a background: it is all of one colour, or transparent")
     areas = np.bincount(labels.ravel(), minlength=count + 1)
     areas[0] = 0
-    largest = int(areas.argmax())
-    figures = int((areas >= SECOND * areas[largest]).sum())
-    if figures > 1:
-        raise FormatError(f"shows {figures} figures that do not touch; cut out the one that is meant")
-    figure: Bool = labels == largest
-    fit_mask(figure)  # its size
+    return labels, areas
+
+
+def _cut_figure(labels: Int32, areas: Intp) -> Bool:
+    from scipy import ndimage
+
+    figure: Bool = labels == areas.argmax()
     holes, _ = ndimage.label(~figure)
-    small = np.bincount(holes.ravel()) < HOLE * areas[largest]
+    small = np.bincount(holes.ravel()) < HOLE * areas.max()
     return np.asarray(figure | (small[holes] & ~figure))
