@@ -105,14 +105,14 @@ vec2 unlost(vec3 albedo) {
 // it: key light, open sky, through the skin from behind, rim light; scatter: 1 skin, 0 cloth.
 vec3 diffuse(vec3 n, vec3 albedo, vec4 reach, float scatter) {
     // Scattering below the surface softens the edge of the shade, most of all in red.
-    vec3 spread = vec3(0.24, 0.12, 0.08) * scatter;
+    vec3 spread = vec3(0.24, 0.15, 0.11) * scatter;
     vec3 key = clamp((dot(n, KEY_DIRECTION) + spread) / (1.0 + spread), 0.0, 1.0);
     key *= 1.0 - spread + spread * key;
-    key *= reach.x * (1.0 + (1.0 - reach.x) * vec3(0.34, 0.10, 0.0) * scatter);
+    key *= reach.x * (1.0 + (1.0 - reach.x) * vec3(0.16, 0.05, 0.0) * scatter);
     // In folds, light is reflected again, and red light passes through flesh.
     vec3 open = reach.y * (1.0 + (1.0 - reach.y) * 0.85 * albedo);
     open += (1.0 - reach.y) * vec3(0.24, 0.10, 0.085) * scatter;
-    vec3 dome = FILL * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0);
+    vec3 dome = (FILL + vec3(0.06, 0.05, 0.04) * scatter) * max(dot(n, FILL_DIRECTION) * 0.7 + 0.3, 0.0);
     dome += mix(FLOOR, SKY, n.y * 0.5 + 0.5) * 0.62;
     float rim = max(dot(n, RIM_DIRECTION), 0.0) * reach.w;
 #ifdef LIMBS
