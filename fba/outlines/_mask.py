@@ -189,7 +189,7 @@ def _single_figure(mask: Bool) -> Bool:
 
 
 def _label(mask: Bool) -> tuple[Int32, Intp]:
-    """Return which figure each pixel belongs to (H, W), and their areas; 0 for what is none."""
+    """Return which figure each pixel belongs to (H, W), and the areas; figure 0, the background, has none."""
     from scipy import ndimage
 
     labels, count = ndimage.label(mask, np.ones((3, 3)))

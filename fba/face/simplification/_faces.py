@@ -51,7 +51,7 @@ BROAD_FAPS = (3, 14, 15, 16, 17)
 IMPORTANCE = 140.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
-LID_SHARE = 6.0
+LID_SHARE = 7.0
 """Factor of the motion of lids, which must pass close to the eyeball."""
 EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""

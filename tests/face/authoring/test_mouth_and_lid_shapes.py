@@ -106,7 +106,7 @@ def test_the_fold_above_a_closing_lid_is_stretched_out() -> None:
     ways = np.array([-0.5, 0.0, 0.5, 1.0])
     shifts = np.zeros((4, len(moving), 3))
     shifts[..., 1] = -0.003 * ways[:, None] * share[moving]
-    eye = Eye("left", ("eye",), np.array([0.010, -0.012, -0.040]), 0.012, np.zeros(3), measured=True)
+    eye = Eye("left", ("eye",), np.array([0.010, -0.012, -0.040]), 0.036, np.zeros(3), measured=True)
     stretched = stretch_fold(sheet, share, moving, shifts, ways, eye)
     np.testing.assert_array_equal(stretched[:2], shifts[:2])  # of an eye that is open, or wide open
     edge = share[moving] >= STRETCHED[1]

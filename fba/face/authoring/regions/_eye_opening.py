@@ -43,6 +43,8 @@ STRETCHED = (0.02, 0.7)
 """Shares of the margin's motion between which the skin of a closed upper lid is stretched."""
 OUTER = 1.05
 """Radii of the eyeball beyond which there is the outside of a lid, not its lining."""
+MOST_RAISED = 0.06
+"""How far, in radii of the eyeball, that raises or sinks a vertex at most."""
 PLATE_RINGS = 3
 """Rings of vertices around it whose positions say how it bends at its edge."""
 SLACK = 0.01
@@ -152,7 +154,10 @@ def stretch_fold(
         near = near | surface.mask(surface.edges[near[surface.edges].any(axis=1)].ravel())
     fixed = np.flatnonzero(near & ~free)
     smooth = solve_smooth_field(surface, free, fixed, closed[fixed], slack=SLACK)
-    raised = np.where(free, ((smooth - closed) * outwards).sum(axis=1), 0.0)
+    raised = ((smooth - closed) * outwards).sum(axis=1)
+    lowest = np.minimum(OUTER * eye.radius - np.linalg.norm(closed - eye.centre, axis=1), 0.0)
+    raised = np.clip(raised, np.maximum(lowest, -MOST_RAISED * eye.radius), MOST_RAISED * eye.radius)
+    raised[~free] = 0.0
     return np.asarray(shifts + smoothstep(ways)[:, None, None] * (raised[:, None] * outwards)[vertices])
 
 
