@@ -54,6 +54,7 @@ export function bakeLight(header, lips, nose) {
 
 /** Return what light from any direction reaches vertices past the mesh: harmonics, and the open share of the sky. @param {Face} face @param {Uint32Array} triangles @param {number[]} rows */
 function bake({ positions, normals }, triangles, rows) {
+  if (!rows.length) return new Float32Array(0); // a head too large, or without lids that move
   const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
   for (const row of rows) {
     for (let axis = 0; axis < 3; axis += 1) {
