@@ -41,8 +41,8 @@ VOLUMES = (
 """Where hair is thicker than elsewhere: above the forehead, behind."""
 DEEPEST = -0.008
 """Least thickness: the skull is flatter at its corners than hair lets it look, metres."""
-EARS = (0.0795, 0.008)
-"""Farther from the middle, and lower, than this (m) there are ears, over which no hair is painted."""
+EARS = (0.0785, 0.0085)
+"""Farther from the middle, and lower, than this (m) there are ears, which have no hair."""
 AXIS = -0.085
 """z of the vertical axis around which the angles of the hairline are measured."""
 
@@ -110,9 +110,9 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
     # Before the ears hair lies close to the head.
     ahead = smoothstep((folded[:, 2] + 0.135) / 0.05) * (1 - smoothstep((folded[:, 1] + 0.015) / 0.085))
     full = full * (1 - 0.8 * ahead)
-    # Locks end in a rounded edge, but hair of the nape grows thinner downwards.
-    nape = smoothstep((-0.105 - folded[:, 2]) / 0.03) * smoothstep((0.02 - folded[:, 1]) / 0.03)
-    share = np.clip(above / (hair.rise * (1 + nape)), 0.0, 1.0)
+    # Locks end in a rounded edge, but hair above the ears and on the nape grows thinner downwards.
+    nape = smoothstep((-0.050 - folded[:, 2]) / 0.03) * smoothstep((0.05 - folded[:, 1]) / 0.04)
+    share = np.clip(above / (hair.rise * (1 + 2 * nape)), 0.0, 1.0)
     share = (share * (2 - share)) ** (0.6 + 0.4 * nape) * smoothstep((above - 0.005) / 0.010)
     return vertices + unit(vertices - MIDDLE) * (share * np.maximum(full, DEEPEST))[:, None]
 
@@ -130,16 +130,15 @@ def _roundness(vertices: Float64, scalp: Bool) -> Float64:
 
 
 def height_above_hairline(positions: Float64) -> Float64:
-    """Return (N,) metres above the hairline of points (N, 3): positive on the scalp, -1 behind ears."""
+    """Return (N,) metres above the hairline of points (N, 3): positive on the scalp, -1 on ears."""
     with (Path(__file__).parent / "hairline.csv").open(encoding="utf-8") as file:
         line = np.array([[float(row["degrees"]), float(row["y"]) / 1000] for row in csv.DictReader(file)])
     around = np.degrees(np.arctan2(np.abs(positions[:, 0]), positions[:, 2] - AXIS))
     height = PchipInterpolator(line[:, 0], line[:, 1])
     slope = height.derivative()(around) * 180 / np.pi / 0.08
     above = (positions[:, 1] - height(around)) / np.sqrt(1 + slope**2)
-    ear = (np.abs(positions[:, 0]) > 0.0765) & (positions[:, 1] < 0.006)
-    ear &= (positions[:, 2] > -0.122) & (positions[:, 2] < -0.100)
-    return np.where(ear, -1.0, above)
+    ears = (np.abs(positions[:, 0]) > EARS[0]) & (positions[:, 1] < EARS[1])
+    return np.where(ears, -1.0, above)
 
 
 def painted_height(positions: Float64, hair: Hair) -> Float64:
@@ -226,8 +225,7 @@ def paint_locks(p: Float64, step: Float64, hair: Hair) -> tuple[Float64, Float64
     if not hair.curly:
         bright = shine(unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69))
         tone = tone * (1 + 0.3 * bright) + 0.40 * bright
-    ears = (np.abs(p[:, 0]) > EARS[0]) & (p[:, 1] < EARS[1])
-    return tone, np.where(ears, 0.0, cover * thin)
+    return tone, np.where(above < -0.5, 0.0, cover * thin)
 
 
 def shine(rise: Float64) -> Float64:

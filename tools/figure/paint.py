@@ -31,7 +31,7 @@ TAPER = ((1.0, 110), (0.7, 190), (0.4, 255))
 """Shares of a brow's hair from its root, and how opaque they are, 0..255: it ends in a point."""
 BROW = np.array([
     # along the left brow: x, y, extent downwards and upwards (mm)
-    (12.5, 14.6, 3.7, 3.3), (18, 17.4, 4.3, 3.8), (26, 20.2, 4.2, 3.6), (35, 22.1, 3.5, 3.2),
+    (12.5, 14.6, 3.0, 2.5), (18, 17.2, 4.0, 3.4), (26, 20.2, 4.2, 3.6), (35, 22.1, 3.5, 3.2),
     (44, 21.8, 2.7, 2.6), (52, 18.5, 1.9, 1.9), (59, 13.6, 0.9, 0.9),
 ]) / 1000  # fmt: skip
 
@@ -88,7 +88,7 @@ def brow(positions: Float64, height: float = 1.0) -> tuple[Float64, Float64]:
     reach = np.where(offset < 0, low, high) * height
     across = 1 - smoothstep((np.abs(offset) / reach - 0.15) / 0.95)
     along = (x - BROW[0, 0]) / (BROW[-1, 0] - BROW[0, 0])
-    ends = smoothstep((along + 0.06) / 0.36) * (1 - smoothstep((along - 0.68) / 0.34))
+    ends = smoothstep((along + 0.06) / 0.52) * (1 - smoothstep((along - 0.68) / 0.34))
     front = positions[:, 2] > -0.03
     return along, np.where(front, across * ends, 0.0)
 
