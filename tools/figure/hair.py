@@ -110,10 +110,10 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
     # Before the ears hair lies close to the head.
     ahead = smoothstep((folded[:, 2] + 0.135) / 0.05) * (1 - smoothstep((folded[:, 1] + 0.015) / 0.085))
     full = full * (1 - 0.8 * ahead)
-    # Locks end in a rounded edge, but hair above the ears and on the nape grows thinner downwards.
-    nape = smoothstep((-0.050 - folded[:, 2]) / 0.03) * smoothstep((0.05 - folded[:, 1]) / 0.04)
-    share = np.clip(above / (hair.rise * (1 + 2 * nape)), 0.0, 1.0)
-    share = (share * (2 - share)) ** (0.6 + 0.4 * nape) * smoothstep((above - 0.005) / 0.010)
+    # Locks end in a rounded edge, but hair of the temples and the nape grows thinner downwards.
+    low = smoothstep((0.06 - folded[:, 1]) / 0.05)
+    share = np.clip(above / (hair.rise * (1 + 2 * low)), 0.0, 1.0)
+    share = (share * (2 - share)) ** (0.6 + 0.4 * low) * smoothstep((above - 0.005) / 0.010)
     return vertices + unit(vertices - MIDDLE) * (share * np.maximum(full, DEEPEST))[:, None]
 
 
