@@ -23,12 +23,13 @@ AT_EASE = {
     "middle1_flexion": -21, "middle2_flexion": -26, "middle3_flexion": -14,
     "ring1_flexion": -25, "ring2_flexion": -29, "ring3_flexion": -16, "ring1_pivot": 1,
     "pinky1_flexion": -28, "pinky2_flexion": -30, "pinky3_flexion": -16, "pinky1_pivot": 3,
-    "thumb1_pivot": 20, "thumb2_flexion": -10, "thumb3_flexion": -14,
+    "thumb1_pivot": 36, "thumb2_flexion": -12, "thumb3_flexion": -14,
 }  # fmt: skip
 """Degrees of the BAPs of a left hand at ease, by name; `pivot` opens a right hand the other way."""
 SAID = 0.15
-"""Radians of any finger from which the fingers of a hand are shown as sent."""
-FINGERS = ("index", "middle", "ring", "pinky", "thumb")
+"""Radians of any of its fingers from which one of `FINGERS` is shown as sent."""
+FINGERS = (("index", "middle", "ring", "pinky"), ("thumb",))
+"""Those that are at ease together: programs that bend fingers often leave out the thumb."""
 
 
 class FigurePoser:
@@ -48,14 +49,17 @@ class FigurePoser:
 
     @cached_property
     def _hands(self) -> list[tuple[Bool, Float64]]:
-        """For each hand, bool (296,), which BAPs are of its fingers, and float64 (296,), fingers at ease."""
+        """For the fingers and the thumb of each hand, bool (296,), which BAPs are theirs, and float64 (296,),
+        these at ease."""
         hands = []
         for side in SIDES:
             names = [bap.name.removeprefix(f"{side}_") if bap.name[0] == side else "" for bap in baps()]
             degrees = np.array([AT_EASE.get(name, 0) for name in names], dtype=np.float64)
             if side == "r":
                 degrees[[name.endswith("_pivot") for name in names]] *= -1
-            hands.append((np.array([name.startswith(FINGERS) for name in names]), np.radians(degrees) * 1e5))
+            for fingers in FINGERS:
+                own = np.array([name.startswith(fingers) for name in names])
+                hands.append((own, np.where(own, np.radians(degrees) * 1e5, 0.0)))
         return hands
 
     def pose(self, values: Float64, switches: Mapping[str, Value]) -> Float64:
