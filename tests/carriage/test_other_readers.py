@@ -94,15 +94,9 @@ def test_pyav(made: tuple[Path, bytes, PlaneSamples]) -> None:
 def test_ffprobe(made: tuple[Path, bytes, PlaneSamples]) -> None:
     path, _, samples = made
     asked = [
-        "-show_packets",
-        "-show_streams",
-        "-show_data_hash",
-        "sha256",
-        "-select_streams",
-        "v",
-        "-of",
+        "-show_packets", "-show_streams", "-show_data_hash", "sha256", "-select_streams", "v", "-of",
         "json",
-    ]
+    ]  # fmt: skip
     done = subprocess.run(["ffprobe", "-v", "fatal", *asked, str(path)], capture_output=True, check=True)
     found = json.loads(done.stdout)
     (stream,) = found["streams"]

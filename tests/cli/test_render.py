@@ -267,8 +267,7 @@ def test_numbered_pictures_and_gifs(run: Run, clip: Path, tmp_path: Path) -> Non
     assert run(*arguments) == (0, f"{folder}: 96x72\n", "")
     assert sorted(path.name for path in folder.iterdir()) == [f"{number:05d}.png" for number in range(6)]
     with Image.open(folder / "00000.png") as picture:
-        assert picture.mode == "RGBA"
-        assert picture.getextrema()[3] == (0, 255)
+        assert (picture.mode, picture.getextrema()[3]) == ("RGBA", (0, 255))
     assert "00000.png to 00005.png (6 pictures) are in this folder already" in run(*arguments, code=1).err
     run(*arguments, "--replace")
     gif = tmp_path / "a.gif"
@@ -489,6 +488,4 @@ def test_a_transparent_background_is_in_the_file(run: Run, tmp_path: Path) -> No
     path = tmp_path / "clear.png"
     run("render", *FACE, "--show", "background=transparent", "-o", path)
     pixels = np.asarray(Image.open(path))
-    assert pixels.shape == (48, 64, 4)
-    assert pixels[2, 2, 3] == 0
-    assert pixels[24, 32, 3] == 255
+    assert (pixels.shape, pixels[2, 2, 3], pixels[24, 32, 3]) == ((48, 64, 4), 0, 255)

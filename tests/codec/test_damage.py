@@ -63,8 +63,7 @@ def is_good(frame: Frame, same: Frame) -> bool:
 
 
 def checked_animation(data: bytes, mode: str) -> Animation | FbaError:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         try:
             animation = decode(data, on_error=mode)  # type: ignore[arg-type]
         except (BitstreamError, UnsupportedError) as error:
@@ -262,15 +261,13 @@ def test_what_ends_an_object_before_another(between: bytes, warned: str) -> None
     """Headers of the next object do so in order; another start code is told."""
     data, frames = stream("body"), truth("body")
     assert data.endswith(END)
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as told:
         animation = decode(data[:-4] + between + data)
     assert len(animation) == 2 * len(frames)
     assert [f"start code 00 00 01 {warned} where" in str(one.message) for one in told] == [True] * bool(
         warned
     )
-    with warnings.catch_warnings(record=True) as lost:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as lost:
         assert decode(data[:-4] + between + data, on_error="salvage") == animation
     assert len(lost) == len(told)
 

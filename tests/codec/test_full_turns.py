@@ -72,8 +72,7 @@ def test_i_planes_that_are_due_are_written_where_a_person_turns_round_and_round(
     turn = np.arange(0, 3_000_000, 10_000)
     got, statistics = coded(motion({TURN: turn}), bap_steps="visage", clamp=True, intra_period=1)
     assert angle_between(got[:, TURN - 1], turn).max() <= 90  # half a step, and half a unit for each turn
-    assert statistics.intra_planes == 10
-    assert statistics.clamped == 0
+    assert (statistics.intra_planes, statistics.clamped) == (10, 0)
 
 
 def test_the_plane_with_the_smaller_error_is_chosen() -> None:

@@ -148,8 +148,7 @@ def test_amounts_out_of_range(field: str, column: int, value: int) -> None:
         RangeError, match=rf"value {value} cannot be carried: it lies outside 0..63"
     ) as caught:
         encode(animation())
-    assert caught.value.frame == 1
-    assert caught.value.limits == (0, 63)
+    assert (caught.value.frame, caught.value.limits) == (1, (0, 63))
     coded, statistics = encode_animation(animation(), EncoderOptions(clamp=True))
     track = decode(coded).face
     assert track is not None

@@ -163,8 +163,7 @@ def test_every_bit_flipped_leaves_the_times_behind_it_alone() -> None:
         frames, _, decoder = decoded(bytes(bad), mode="salvage")
         if all(frame.rate == 3 for frame in frames):
             assert all(a.index < b.index for a, b in pairwise(frames))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             whole = decode(bytes(bad), on_error="salvage")
         section = next((at for at in codes if 8 * at > bit), codes[-1])
         behind = {f.index for f in true if f.plane.bit >= 8 * section - 8}
@@ -297,8 +296,7 @@ def test_a_time_code_that_was_too_high_is_corrected() -> None:
     bad = bytearray(destroyed(data, 2))  # frames 75 to 99
     at = 8 * points[3] + 32 + 4 + 13 + 1 + 12 + 1  # seconds of 0:00:04, 16 of them more
     bad[at >> 3] ^= 128 >> (at & 7)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", FbaWarning)
+    with warnings.catch_warnings(record=True, action="always", category=FbaWarning) as caught:
         animation = decode(bytes(bad), on_error="salvage")
     assert any("0:00:05 lies before the previous plane" in str(one.message) for one in caught)
     assert animation.index.tolist() == [*range(75), *range(150, 200)]

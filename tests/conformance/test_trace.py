@@ -131,12 +131,10 @@ def test_every_element_of_an_intra_plane() -> None:
 
     (plane,) = decode_values(data)
     assert plane["fap"] == {3: -20 * 4 * 3, 61: 140 * 1 * 3}
-    assert plane["viseme"] == [14, 2, 63, 1]
-    assert plane["expression"] == [6, 60, 1, 0, 0, 1]
+    assert (plane["viseme"], plane["expression"]) == ([14, 2, 63, 1], [6, 60, 1, 0, 0, 1])
     assert plane["rate"] == Fraction(479_000, 16_016)  # 29 15/16, times 1000/1001
     assert plane["time"] == (23 * 60 + 59) * 60 + 58
-    assert plane["skip"] == 17
-    assert plane["frame_rate"] == (29, 15, 1)
+    assert (plane["skip"], plane["frame_rate"]) == (17, (29, 15, 1))
     assert plane["fap_mask_types"] == (3, 1, 0, 0, 0, 0, 0, 0, 2, 0)
 
 

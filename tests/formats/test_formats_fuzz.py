@@ -38,8 +38,7 @@ def test_cut_at_every_byte(tmp_path: Path) -> None:
     frames = []
     for end in range(1, len(FAP)):
         path.write_bytes(FAP[:end])
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             warnings.simplefilter("ignore", FbaWarning)
             try:
                 frames.append(len(read_fap(path, salvage=True)))
@@ -59,8 +58,7 @@ def test_cut_at_every_byte(tmp_path: Path) -> None:
 def test_anything_at_all(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "a.fap"
     path.write_bytes(data)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         warnings.simplefilter("ignore", FbaWarning)
         try:
             animation = read(path, source_rate=25) if data[:4] not in (b"\0\0\1\xba", b"\0\0\1\1") else None

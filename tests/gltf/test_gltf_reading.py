@@ -131,8 +131,7 @@ def test_morph_targets_have_the_names_of_the_extras(tmp_path: Path) -> None:
         del holder["extras"]
     mesh["weights"] = [0.25, 1]
     (found,) = read_gltf(sheet.save(tmp_path / "a.glb")).meshes
-    assert found.morph_names == ("target 0", "target 1")
-    assert found.weights == (0.25, 1.0)
+    assert (found.morph_names, found.weights) == (("target 0", "target 1"), (0.25, 1.0))
     first, second = found.primitives[0].morphs
     assert first.tolist() == [[0, 0, 0], [0, 0, 0], [0, 0, 4]]
     assert second is None
@@ -230,8 +229,7 @@ def test_animations(tmp_path: Path) -> None:
     (animation,) = read_gltf(sheet.save(tmp_path / "a.glb")).animations
     turn, shift, morph = animation.channels  # the fourth animates no node
     assert (animation.name, turn.node, turn.path, turn.interpolation) == ("wave", 0, "rotation", "LINEAR")
-    assert turn.times.tolist() == [0, 0.5]
-    assert turn.values.tolist() == [[0, 0, 0, 1], [0, 1, 0, 0]]
+    assert (turn.times.tolist(), turn.values.tolist()) == ([0, 0.5], [[0, 0, 0, 1], [0, 1, 0, 0]])
     assert shift.values.tolist()[1] == [[9, 10, 11], [12, 13, 14], [15, 16, 17]]
     assert (morph.interpolation, morph.values.tolist()) == ("STEP", [[1, 2], [3, 4]])
 
@@ -324,6 +322,5 @@ def test_extensions_that_are_required(tmp_path: Path) -> None:
     with pytest.warns(FbaWarning, match="KHR_texture_basisu cannot be read; left out"):
         read_gltf(sheet.save(tmp_path / "a.glb"))
     sheet.json["extensionsRequired"] = ["KHR_materials_unlit", "KHR_texture_transform"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         read_gltf(sheet.save(tmp_path / "a.glb"))

@@ -81,8 +81,7 @@ def test_where_is_no_face_none_is_found() -> None:
     plain = np.full((200, 200, 3), 128, dtype=np.uint8)
     for pixels in (noise, plain):
         photograph = Photograph(pixels, (200, 200), "no.png")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             with pytest.raises(ModelError, match=r"no\.png.*no face was found"):
                 find_front_points(photograph)
             with pytest.raises(ModelError, match=r"no\.png"):

@@ -301,8 +301,7 @@ def test_damage_is_an_error_or_another_face(damage: Any, seed: int) -> None:
     rng = random.Random(seed)
     loaded, refused = 0, set()
     for _ in range(120):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             warnings.simplefilter("ignore", FbaWarning)
             try:
                 model = read(damage(rng))

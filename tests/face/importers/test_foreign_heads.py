@@ -125,8 +125,7 @@ def test_points_of_the_right_side_mirror_those_of_the_left() -> None:
         "9.3": np.array([1.5, 0, 4]), "8.4": np.array([-1.0, 5, 5]),
     }  # fmt: skip
     mirrored = mirror_points(points, 1.0)
-    assert mirrored["2.5"].tolist() == [-1, 1, 2]
-    assert mirrored["9.3"].tolist() == [1, 0, 4]
+    assert (mirrored["2.5"].tolist(), mirrored["9.3"].tolist()) == ([-1, 1, 2], [1, 0, 4])
     assert mirrored["8.3"].tolist() == [3, 5, 5]
 
 

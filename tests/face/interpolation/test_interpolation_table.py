@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fba.errors import ModelError
 from fba.face.interpolation._evaluate import evaluate
-from fba.face.interpolation._terms import Function, Link, Term
+from fba.face.interpolation._node import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import fap_numbers, faps
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import hand_tracks
 from fba.animation import FaceTrack
 from fba.face import Definitions, Resolver, resolve
-from fba.face.interpolation._terms import Function, Link, Term
+from fba.face.interpolation._node import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import fap_numbers
 

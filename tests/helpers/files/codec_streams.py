@@ -73,8 +73,7 @@ def decoded(
     """All frames that come out, what was raised, and the decoder."""
     decoder = Decoder(on_error=mode, bap_steps=bap_steps)  # type: ignore[arg-type]
     frames: list[Frame] = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         try:
             for start in range(0, len(data), chunk or len(data) or 1):
                 frames += decoder.push(data[start : start + (chunk or len(data))])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from fba.face._expressions import Definitions
 from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names, neutral_points
-from fba.face.interpolation._terms import Function, Link, Term
+from fba.face.interpolation._node import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, DetailLevel, FaceModel, Material, Part, shape_key
 from fba.parameters import faps, point_rows

@@ -59,8 +59,7 @@ def test_every_picture_has_its_time_and_its_colours(tmp_path: Path, rate: str) -
         assert np.abs(shown.astype(int) - colour).max() <= 6
     with av.open(str(path)) as film:
         stream = film.streams.video[0]
-        assert stream.codec_context.name == "h264"
-        assert stream.codec_context.pix_fmt == "yuv420p"
+        assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
         assert stream.codec_context.colorspace == av.video.reformatter.Colorspace.ITU709
         assert stream.average_rate == Fraction(rate)
 

@@ -141,8 +141,7 @@ def test_one_frame_alone() -> None:
     player, clock = transport([5])
     player.play()
     clock.now += 3.33
-    assert player.frame == 0
-    assert player.share == 0.0
+    assert (player.frame, player.share) == (0, 0.0)
 
 
 def test_stop_stays_where_it_is() -> None:
@@ -289,8 +288,7 @@ def test_timecode_is_that_of_the_stream() -> None:
     player, _ = transport([25 * 3661 + 24, 25 * 3662], rate=25)  # 1 h, 1 min, 1 s and 24 frames
     assert player.timecode() == "1:01:01:24"
     player.last()
-    assert player.timecode() == "1:01:02:00"
-    assert player.timecode(0.999) == "0:00:00:24"
+    assert (player.timecode(), player.timecode(0.999)) == ("1:01:02:00", "0:00:00:24")
 
 
 @pytest.mark.parametrize(

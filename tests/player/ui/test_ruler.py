@@ -12,10 +12,7 @@ from player_tracks import face_track
 
 def test_places_and_times() -> None:
     ruler = Ruler(2.0, 12.0, 100.0, 600.0)
-    assert ruler.x(2.0) == 100
-    assert ruler.x(7.0) == 350
-    assert ruler.x(99.0) == 600
-    assert ruler.time(350) == 7.0
+    assert (ruler.x(2.0), ruler.x(7.0), ruler.x(99.0), ruler.time(350)) == (100, 350, 600, 7.0)
     assert ruler.time(-50) == 2.0
     assert Ruler(3.0, 3.0, 0.0, 100.0).x(3.0) == 0  # a single frame
     assert Ruler(3.0, 4.0, 50.0, 50.0).time(50) == 3.0  # no room
@@ -68,14 +65,12 @@ def still_values(frames: int) -> np.ndarray:
 def test_motion_is_added_up_over_parameters() -> None:
     face = face_track([{3: 0, 5: 0}, {3: 50, 5: 0}, {3: 100, 5: 10}, {3: 100, 5: 10}])
     trace = trace_of_motion(Animation(25, np.array([0, 1, 2, 5]), face=face))  # type: ignore[arg-type]
-    assert trace is not None
     np.testing.assert_allclose(trace.amounts, [0.0, 0.5, 1.5, 0.0])
     np.testing.assert_allclose(trace.times, [0.0, 0.04, 0.08, 0.2])
     joy = np.zeros((3, 6), dtype=int)
     joy[1:, 0], joy[1:, 1] = 1, [30, 60]
     smile = FaceTrack(still_values(3), np.ones((3, 68), bool), expression=joy)
     trace = trace_of_motion(Animation(25, np.arange(3), face=smile))  # type: ignore[arg-type]
-    assert trace is not None
     np.testing.assert_allclose(trace.amounts, [0.0, 1.5, 0.5])  # the expression is chosen and half there
     still = face_track([{3: 7}, {3: 7}])
     assert trace_of_motion(Animation(25, np.arange(2), face=still)) is None  # type: ignore[arg-type]

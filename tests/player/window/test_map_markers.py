@@ -171,14 +171,11 @@ def test_changes_are_made_undone_and_saved(editing: MarkerEditing, head: MarkedH
         editing.resize(size, 0.02)
     assert editing.mapping.markers["8.2"].radius == 0.013
     reach = editing.influence
-    assert reach is not None
     editing.assign("exclusive")
     alone = editing.influence
-    assert alone is not None
     assert len(alone.vertices) < len(reach.vertices)
     editing.add_up("add")
     editing.fix(True)
-    assert editing.performance is not None
     assert not editing.performance.displacements[:, editing.performance.names.index("8.2")].any()
     editing.save()
     saved = read_mapping(editing.path or "")
@@ -209,8 +206,7 @@ def test_a_mapping_begun_by_hand_says_what_it_lacks(head: MarkedHead) -> None:
         assert vertex is not None
         editing.place(vertex)
     assert editing.performance is not None
-    assert editing.problem == ""
-    assert editing.mapping.fixed == ("11.1", "11.2", "11.3")
+    assert (editing.problem, editing.mapping.fixed) == ("", ("11.1", "11.2", "11.3"))
     editing.next_missing()
     assert editing.current not in editing.mapping.markers
     editing.fix(False)

@@ -12,8 +12,7 @@ import pytest
 import graphics
 from fba.errors import DisplayError
 from fba.face.fitting import Photograph, read_photo_points
-from fba_player.scene._photo_editing import PhotoEditing
-from fba_player.scene._photo_scene import PhotoScene
+from fba_player.scene._photo_scene import PhotoEditing, PhotoScene
 from fba_player.session._pages import PHOTOS
 from fba_player.session._session import Session
 from fba_player.view._geometry import project
