@@ -3,7 +3,7 @@
 May use: parameters and the data model.
 """
 
-from fba.codec._block import Block
+from fba.codec._coded_frames import Block
 from fba.codec._decoder import Decoder, decode
 from fba.codec._encoder import ClampedParameter, Encoder, EncoderStatistics, encode_animation
 from fba.codec._frame_buffers import DecodedFrames, FrameBuffer

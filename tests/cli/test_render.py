@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-import wave
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from command_line import Run
 from fba import Animation
 from fba.body import gait
 from fba.cli.pose_options import Pose, still_animation
+from sound_clicks import write_wave
 from started_programs import started
 
 FACE = ("--fap", "open_jaw=200", "--size", "64x48", "--camera", "front")
@@ -194,10 +194,7 @@ def clip(tmp_path: Path, face: Animation) -> Path:
 
 
 def write_tone(path: Path, seconds: float) -> None:
-    samples = np.rint(9000 * np.sin(np.arange(round(seconds * 16000)) / 5)).astype("<i2")
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, 16000, 0, "NONE", ""))
-        file.writeframes(samples.tobytes())
+    write_wave(path, np.rint(9000 * np.sin(np.arange(round(seconds * 16000)) / 5)))
 
 
 def streams(path: Path) -> tuple[int, int]:
@@ -236,9 +233,7 @@ def test_the_sound_begins_later_or_earlier(run: Run, clip: Path, tmp_path: Path,
     av = pytest.importorskip("av")
     silence = np.zeros(16000, "<i2")
     silence[1600:1632] = 30000  # a click at 0.1 s
-    with wave.open(str(clip.with_suffix(".wav")), "wb") as file:
-        file.setparams((1, 2, 16000, 0, "NONE", ""))
-        file.writeframes(silence.tobytes())
+    write_wave(clip.with_suffix(".wav"), silence)
     path = tmp_path / "film.mp4"
     run("render", clip, "-o", path, "--audio-offset", str(offset), *SMALL)
     with av.open(str(path)) as film:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fba
+from codec_streams import flipped
 from fba import Animation, BitstreamError, Decoder, EncoderOptions, FbaError, FbaWarning
 from fba.codec import Damage, Encoder, probe_stream, verify_stream, write_mark
 from fba_conformance.trace import planes as read_planes
@@ -36,12 +37,6 @@ def stream(options: EncoderOptions) -> bytes:
 
 def bare(options: EncoderOptions) -> bytes:
     return stream(EncoderOptions(**{**options.__dict__, "mark": False}))
-
-
-def flipped(data: bytes, bit: int) -> bytes:
-    changed = bytearray(data)
-    changed[bit >> 3] ^= 128 >> (bit & 7)
-    return bytes(changed)
 
 
 def written(crc: int) -> bytes:

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from codec_streams import END, OBJECT, content, decoded
+from codec_streams import END, OBJECT, content, decoded, flipped
 from fba import (
     Animation,
     BitstreamError,
@@ -104,21 +104,20 @@ def test_every_bit_flipped(name: str) -> None:
     data, frames = stream(name), truth(name)
     codes = [at for at in start_codes(data) if data[at + 3] in {0xBB, 0xB1}]
     for bit in range(8 * len(data)):
-        bad = bytearray(data)
-        bad[bit >> 3] ^= 128 >> (bit & 7)
+        bad = flipped(data, bit)
         before = [f for f in frames if f.plane.bit + f.plane.bits <= bit]
-        got, error, _ = decoded(bytes(bad))
+        got, error, _ = decoded(bad)
         assert error is None or isinstance(error, (BitstreamError, UnsupportedError))
         assert len(got) >= len(before) - (bit >= 8 * len(data) - 32)
         assert all(is_good(*pair) for pair in zip(got, before, strict=False))
-        salvaged, fatal, decoder = decoded(bytes(bad), mode="salvage")
+        salvaged, fatal, decoder = decoded(bad, mode="salvage")
         assert fatal is None or not salvaged
         assert len(salvaged) >= len(got)
         assert all(is_good(*pair) for pair in zip(salvaged, before, strict=False))
         at = 0
         for damage in decoder.damage:
             assert at <= damage.start <= damage.stop <= len(data)
-            assert damage.stop == len(data) or bytes(bad[damage.stop : damage.stop + 3]) == b"\0\0\1"
+            assert damage.stop == len(data) or bad[damage.stop : damage.stop + 3] == b"\0\0\1"
             at = damage.stop
         if error is not None:
             assert decoder.damage

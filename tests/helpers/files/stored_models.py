@@ -212,12 +212,8 @@ def assert_same(one: FaceModel, other: FaceModel) -> None:
     assert one.fit == other.fit
     assert np.array_equal(one.definitions.visemes, other.definitions.visemes)
     assert np.array_equal(one.definitions.expressions, other.definitions.expressions)
-    assert (one.name, one.lost, one.notes, one.wrinkles) == (
-        other.name,
-        other.lost,
-        other.notes,
-        other.wrinkles,
-    )
+    for name in ("name", "lost", "notes", "wrinkles"):
+        assert getattr(one, name) == getattr(other, name)
 
 
 def vars_of(part: Part) -> dict[str, Any]:

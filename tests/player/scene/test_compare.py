@@ -11,8 +11,7 @@ from fba_player.gl._annotation_renderer import LEGEND_MARGIN, NAME_SIZE, REFEREN
 from fba_player.gl._labels import legend_picture
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Transport
-from fba_player.scene._compare_timeline import CompareTimeline
-from fba_player.scene._differences import differences
+from fba_player.scene._compare_timeline import CompareTimeline, differences
 from fba_player.scene.compare import ROOTS, CompareScene, distances, round_up
 from fba_player.scene.scene import Scene
 from fba_player.view._geometry import project

@@ -25,10 +25,16 @@ def played() -> tuple[np.ndarray, np.ndarray]:
     return np.arange(1001, 1069, dtype=np.float32), np.arange(2001, 2297, dtype=np.float64)
 
 
-def test_an_untouched_puppet_changes_nothing() -> None:
-    puppet = Puppet()
+def shown(puppet: Puppet) -> tuple[np.ndarray, np.ndarray]:
+    """What the puppet makes of what is played."""
     faps, baps = played()
     puppet(faps, baps)
+    return faps, baps
+
+
+def test_an_untouched_puppet_changes_nothing() -> None:
+    puppet = Puppet()
+    faps, baps = shown(puppet)
     assert puppet.idle
     np.testing.assert_array_equal(faps, played()[0])
     np.testing.assert_array_equal(baps, played()[1])
@@ -38,14 +44,12 @@ def test_what_is_moved_stays_until_released() -> None:
     puppet = Puppet()
     puppet.move_fap(3, 400)
     puppet.move_bap(32, -5e4)
-    faps, baps = played()
-    puppet(faps, baps)
+    faps, baps = shown(puppet)
     assert (faps[2], faps[3], baps[31], baps[32]) == (400, 1004, -5e4, 2033)
     assert (puppet.motion[0][2], puppet.motion[1][31]) == (1003, 2032)  # what is played is still known
     assert puppet.shown[0][2] == 400
     puppet.release(faps=(3,))
-    faps, baps = played()
-    puppet(faps, baps)
+    faps, baps = shown(puppet)
     assert (faps[2], baps[31]) == (1003, -5e4)
     puppet.release_all()
     assert puppet.idle
@@ -54,32 +58,25 @@ def test_what_is_moved_stays_until_released() -> None:
 def test_a_viseme_takes_the_mouth_and_leaves_the_brows() -> None:
     puppet = Puppet()
     puppet.viseme = Viseme(10, 0, 63)  # A:
-    faps, baps = played()
-    puppet(faps, baps)
+    faps = shown(puppet)[0]
     assert 0 < faps[2] < 1000  # open_jaw as the table has it
     assert faps[30] == 1031  # raise_l_i_eyebrow
     half = Puppet()
     half.viseme = Viseme(10, 0, 21)
-    weaker, baps = played()
-    half(weaker, baps)
-    assert weaker[2] == pytest.approx(faps[2] / 3)
+    assert shown(half)[0][2] == pytest.approx(faps[2] / 3)
 
 
 def test_an_expression_is_added_and_a_slider_wins() -> None:
     puppet = Puppet()
     puppet.expression = Expression(6, 63)  # surprise
-    faps, baps = played()
-    puppet(faps, baps)
-    raised = faps[30]
+    raised = shown(puppet)[0][30]
     assert raised > 1031
     puppet.move_fap(31, -7)
-    faps, baps = played()
-    puppet(faps, baps)
+    faps = shown(puppet)[0]
     assert (faps[30], faps[31]) == (-7, pytest.approx(raised + 1))
     puppet.release(faps=(31,))
     puppet.expression = Expression(6, 63, 6, 63)  # twice the same is not twice as much
-    faps, baps = played()
-    puppet(faps, baps)
+    faps = shown(puppet)[0]
     assert faps[30] == pytest.approx(raised)
 
 
@@ -161,17 +158,6 @@ def test_a_take_has_the_rate_of_the_stream_within_limits(rate: str, wanted: str)
     assert take_rate(Fraction(rate)) == Fraction(wanted)
 
 
-@pytest.mark.parametrize(("pause", "between"), [(0.19, True), (0.21, False)])
-def test_a_take_is_interpolated_over_short_pauses_only(pause: float, between: bool) -> None:
-    """Where nothing was drawn for more than 0.2 s, nothing moved until the next picture."""
-    recorder = TakeRecorder(Fraction(100))
-    recorder.add(0.0, np.zeros(68, np.float32), np.zeros(296))
-    recorder.add(pause, np.full(68, 1000, np.float32), np.zeros(296))
-    face = recorder.take().face
-    assert bool(face.values[10, 2]) == between
-    assert face.values[-1, 2] == 1000
-
-
 def test_a_take_comes_back_from_its_file(tmp_path: Path) -> None:
     recorder = TakeRecorder(Fraction(30), body=True)
     rng = np.random.default_rng(3)
@@ -236,8 +222,7 @@ def test_a_gap_of_a_fifth_of_a_second_is_no_motion(gap: float, joined: bool) -> 
     recorder = TakeRecorder(Fraction(100))
     ramp(recorder, np.array([0.0, gap]))
     face = recorder.take().face
-    assert (face.values[10, 2] == 10) == joined
-    assert (face.values[10, 2] == 0) != joined
+    assert face.values[[10, -1], 2].tolist() == [10 * joined, round(100 * gap)]
 
 
 def test_a_take_ends_after_an_hour() -> None:
@@ -254,8 +239,7 @@ def test_a_take_ends_after_an_hour() -> None:
 def test_the_mouth_opens_jaw_and_lips_over_what_is_played() -> None:
     puppet = Puppet()
     puppet.mouth_opening = 50
-    faps, baps = played()
-    puppet(faps, baps)
+    faps = shown(puppet)[0]
     assert not puppet.idle
     assert (faps[2], faps[4], faps[51], faps[18]) == (1003 + 250, 1005 - 300, 1052 - 300, 1019)
     puppet.release_all()
