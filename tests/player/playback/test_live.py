@@ -258,12 +258,12 @@ def test_damage_is_stepped_over_and_told(wire: Wire) -> None:
     assert int(live.index[-1]) > 150
 
 
-@pytest.mark.parametrize(("data", "text"), [(b"nothing of the sort", "00 00 01 ba"), (b"", ".")])
-def test_what_is_no_stream_is_an_error(wire: Wire, data: bytes, text: str) -> None:
+@pytest.mark.parametrize("data", [b"nothing of the sort", b""])
+def test_what_is_no_stream_is_an_error(wire: Wire, data: bytes) -> None:
     live = LiveAnimation(wire.out)
     wire.send(data)
     wire.end()
-    with pytest.raises(FbaError, match=text):
+    with pytest.raises(FbaError, match="00 00 01 ba"):
         live.wait(300)
 
 
