@@ -69,35 +69,11 @@ _MODULES = (
 )  # fmt: skip
 
 __all__ = [
-    "Animation",
-    "BitstreamError",
-    "BodyTrack",
-    "Decoder",
-    "DisplayError",
-    "Encoder",
-    "EncoderOptions",
-    "FaceTrack",
-    "FbaError",
-    "FbaWarning",
-    "FormatError",
-    "Frame",
-    "LimitError",
-    "Limits",
-    "ModelError",
-    "OptionError",
-    "RangeError",
-    "StreamInfo",
-    "UnsupportedError",
-    "body",
-    "capture",
-    "decode",
-    "emotion",
-    "encode",
-    "face",
-    "probe",
-    "read",
-    "write",
-]
+    "Animation", "BitstreamError", "BodyTrack", "Decoder", "DisplayError", "Encoder", "EncoderOptions",
+    "FaceTrack", "FbaError", "FbaWarning", "FormatError", "Frame", "LimitError", "Limits", "ModelError",
+    "OptionError", "RangeError", "StreamInfo", "UnsupportedError", "body", "capture", "decode", "emotion",
+    "encode", "face", "probe", "read", "write",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

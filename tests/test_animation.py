@@ -42,8 +42,7 @@ def test_what_was_not_sent_is_0() -> None:
     mask = np.zeros((2, BODY), dtype=bool)
     mask[0, 3] = True
     track = BodyTrack(values, mask)
-    assert track.values.sum() == 5
-    assert track.values[0, 3] == 5
+    assert (track.values.sum(), track.values[0, 3]) == (5, 5)
     assert (values == 5).all()  # the caller's array is not touched
     fields = np.ones((2, 4), dtype=np.int16)
     assert not FaceTrack(
@@ -137,8 +136,7 @@ def test_frames_and_slices() -> None:
     assert (frame.index, frame.time) == (14, Fraction(14, 25))
     assert frame.face.values.shape == (1, FACE)
     assert frame.face.values[0, 2] == 40
-    assert whole[2:4].index.tolist() == [12, 13]
-    assert whole[::2].index.tolist() == [10, 12, 14]
+    assert (whole[2:4].index.tolist(), whole[::2].index.tolist()) == ([12, 13], [10, 12, 14])
     assert whole[::2].face == face(6)[::2]
     assert whole[3:3].duration == 0
     with pytest.raises(IndexError):
@@ -168,8 +166,7 @@ def test_from_frames() -> None:
     whole = animation(3)
     frames = [Frame(0, Fraction(25), whole[0].face), Frame(2, Fraction(25), None, whole[2].body)]
     joined = Animation.from_frames(frames)
-    assert joined.index.tolist() == [0, 2]
-    assert joined.face.mask.any(axis=1).tolist() == [True, False]
+    assert (joined.index.tolist(), joined.face.mask.any(axis=1).tolist()) == ([0, 2], [True, False])
     assert joined.body.mask.any(axis=1).tolist() == [False, True]
     with pytest.raises(ValueError, match="no frames"):
         Animation.from_frames([])
@@ -197,8 +194,7 @@ def test_resample_up_and_down() -> None:
     assert double.face.values[:, 2].tolist() == [0, 5, 10, 15, 20, 25, 30]
     assert double.body.values[:, 0].tolist() == [0, -4, -7, -10, -14, -18, -21]  # halves to even
     half = animation(4).resample(Fraction(25, 2))
-    assert half.index.tolist() == [0, 1]
-    assert half.face.values[:, 2].tolist() == [0, 20]
+    assert (half.index.tolist(), half.face.values[:, 2].tolist()) == ([0, 1], [0, 20])
     assert animation(4).resample(25) == animation(4)
 
 

@@ -351,7 +351,6 @@ def test_options_in_the_text_exist(page: Path) -> None:
             found: click.Command | None = group
             while isinstance(found, click.Group) and words and re.fullmatch(r"[a-z]+", words[0]):
                 found = found.get_command(context, words.pop(0))
-            assert found is not None, f"{name_of(page)}:{number}: fba {command}: no such command"
             options = {"--help", "--version"}
             for parameter in found.params:
                 options.update(parameter.opts, parameter.secondary_opts)

@@ -454,33 +454,24 @@ def dev(checkout: Path, *arguments: str, **environment: str) -> subprocess.Compl
 def test_dev_lists_its_commands(checkout: Path) -> None:
     done = dev(checkout)
     assert done.returncode == 0
-    for command in [
-        "demo",
-        "test",
-        "lint",
-        "types",
-        "coverage",
-        "bench",
-        "fuzz",
-        "bounds",
-        "docs",
-        "setup",
-        "clean",
-    ]:
+    for command in (
+        "demo", "test", "lint", "types", "coverage", "bench", "fuzz", "bounds", "docs", "setup", "clean",
+    ):  # fmt: skip
         assert f"  {command} " in done.stdout
 
 
-def test_dev_refuses_an_unknown_command(checkout: Path) -> None:
-    done = dev(checkout, "tset")
+@pytest.mark.parametrize(
+    ("arguments", "python", "said"),
+    [
+        (["tset"], "", "there is no command 'tset'"),
+        (["bench", "my/walk.fba"], "", "to measure the codec on a stream: {}/dev fba bench my/walk.fba"),
+        (["test"], "/nowhere/python3", "PYTHON=/nowhere/python3 is no Python 3.11 or later"),
+    ],
+)
+def test_dev_refuses(checkout: Path, arguments: list[str], python: str, said: str) -> None:
+    done = dev(checkout, *arguments, **({"PYTHON": python} if python else {}))
     assert done.returncode == 1
-    assert "there is no command 'tset'" in done.stderr
-    assert not (checkout / ".venv").exists()
-
-
-def test_dev_bench_of_a_stream_names_the_command_for_it(checkout: Path) -> None:
-    done = dev(checkout, "bench", "my/walk.fba")
-    assert done.returncode == 1
-    assert f"to measure the codec on a stream: {checkout / 'dev'} fba bench my/walk.fba" in done.stderr
+    assert said.format(checkout) in done.stderr
     assert not (checkout / ".venv").exists()
 
 
@@ -490,12 +481,6 @@ def test_dev_without_python_says_how_to_get_one(checkout: Path, tmp_path: Path) 
     assert "no Python 3.11 or later here" in done.stderr
     assert "apt-get install python3" in done.stderr
     assert not (checkout / ".venv").exists()
-
-
-def test_dev_refuses_a_python_that_is_none(checkout: Path) -> None:
-    done = dev(checkout, "test", PYTHON="/nowhere/python3")
-    assert done.returncode == 1
-    assert "PYTHON=/nowhere/python3 is no Python 3.11 or later" in done.stderr
 
 
 def test_dev_names_the_package_where_python_cannot_make_environments(checkout: Path, tmp_path: Path) -> None:

@@ -78,8 +78,7 @@ def difference(seed: str) -> tuple[int, str]:
     """Return the number of planes of one random stream, and how its readings differ: "" if they do not."""
     random = Random(seed)
     animation = random_animation(random)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         data = encoded(animation, random_options(random), random)
     walker = Walker(data)
     try:

@@ -10,13 +10,6 @@ from bench.bitrate.subjects import Subject, split_subjects
 from bench.bitrate.tables import summary_lines
 
 __all__ = [
-    "Result",
-    "Subject",
-    "make_page",
-    "make_pictures",
-    "measure",
-    "read_results",
-    "results_csv",
-    "split_subjects",
-    "summary_lines",
-]
+    "Result", "Subject", "make_page", "make_pictures", "measure", "read_results", "results_csv",
+    "split_subjects", "summary_lines",
+]  # fmt: skip

@@ -16,7 +16,7 @@ import pytest
 
 from fba.capture.virtual_markers import MarkedHead, MarkerMapping, VirtualMarker
 from fba.capture.virtual_markers.influence import WalkedMesh
-from fba.capture.virtual_markers.weights import find_weights
+from fba.capture.virtual_markers.mapping import find_weights
 from fba.face import Part
 
 WIDE, HIGH = 161, 150

@@ -251,8 +251,7 @@ class _Sent:
 
 def _salvage(data: bytes) -> tuple[Animation | None, list[int]]:
     """Return what can be salvaged, and the indices of frames that are marked as doubtful."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         try:
             animation = decode(data, bap_steps="visage", on_error="salvage")
         except FbaError:

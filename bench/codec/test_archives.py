@@ -49,8 +49,7 @@ def captured() -> list[Animation]:
     folder = SHARED / "data" / "capture"
     if not folder.is_dir():
         pytest.skip("no shared test material; set FBA_SHARED to its folder")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         return [fba.read(folder / name) for name in CAPTURES]
 
 

@@ -50,8 +50,7 @@ def as_units(animation: fba.Animation, path: Path) -> bytes:
 def read(path: Path, **options: Any) -> fba.Animation:
     if not path.is_file():
         pytest.skip(f"no {path.name} here")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fba.FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=fba.FbaWarning):
         return fba.read(path, **options)
 
 

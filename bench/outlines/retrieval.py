@@ -24,9 +24,9 @@ from fba.outlines import (
     outline_distances,
     read_mask,
 )
-from fba.outlines._distance import project, sample
 from fba.outlines._index import CHOICES
 from fba.outlines._index_file import pack_mask, unpack_mask
+from fba.outlines._methods import project, sample
 from fba.outlines._tree import split_into_paths
 
 QUANTA = 96

@@ -43,8 +43,7 @@ def spoil(animation: Animation) -> Animation:
 
 
 def main() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         motion = read_motion(SOURCE)
     result = spoil(from_skeleton(motion))
     mapped = find_bones(motion, None, Skeleton.default()).joints

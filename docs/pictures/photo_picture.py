@@ -23,8 +23,7 @@ TURNS = {"front": 6.0, "side": 86.0}
 
 def photograph(head: FaceModel, name: str) -> fitting.Photo:
     """A picture of a head, with the places of its feature points."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # it has no FAPs
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):  # it has no FAPs
         scene = player.Scene(Animation(25, np.arange(1), FaceTrack.empty(1)), model=head)
     camera = player.Camera(yaw=TURNS[name], pitch=3).fit(scene.face_subject, SIZE[0] / SIZE[1])
     camera = replace(camera, distance=1.5, field_of_view=2 * float(np.degrees(np.arctan(0.17 / 1.5))))

@@ -151,8 +151,7 @@ def _naming(places: Mapping[Path, Location]) -> Iterator[None]:
             result = result.replace(str(here), str(there))
         return result
 
-    with warnings.catch_warnings(record=True) as odd:
-        warnings.simplefilter("always", FbaWarning)
+    with warnings.catch_warnings(record=True, action="always", category=FbaWarning) as odd:
         try:
             yield
         except FbaError as error:

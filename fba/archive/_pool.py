@@ -149,8 +149,7 @@ def run_chunk(function: Callable[[Item], Value], items: Sequence[Item]) -> list[
 def run_one(function: Callable[[Item], Value], item: Item) -> Outcome[Item, Value]:
     """Return the outcome of an item."""
     value, text = None, ""
-    with warnings.catch_warnings(record=True) as odd:
-        warnings.simplefilter("always", FbaWarning)
+    with warnings.catch_warnings(record=True, action="always", category=FbaWarning) as odd:
         try:
             value = function(item)
         except (FbaError, OSError) as error:

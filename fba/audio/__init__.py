@@ -8,14 +8,6 @@ from fba.audio._pipe import RATES, Pipe, read_pipe
 from fba.audio._sound_file import CHANNELS, SoundFile, av_version, import_av, open_sound
 
 __all__ = [
-    "CHANNELS",
-    "RATES",
-    "Pipe",
-    "SoundFile",
-    "av_version",
-    "find_duration",
-    "import_av",
-    "open_sound",
-    "read_mono",
-    "read_pipe",
-]
+    "CHANNELS", "RATES", "Pipe", "SoundFile", "av_version", "find_duration", "import_av", "open_sound",
+    "read_mono", "read_pipe",
+]  # fmt: skip

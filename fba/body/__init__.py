@@ -30,23 +30,10 @@ _NAMES = {
 """Public names by the module that they are imported from, on first use."""
 
 __all__ = [
-    "ROOT",
-    "SIDES",
-    "AttachedHead",
-    "BapSolver",
-    "BodyDefinition",
-    "BodyModel",
-    "BodyPart",
-    "Excess",
-    "GroundedPoser",
-    "JointLimit",
-    "JointLimits",
-    "Skeleton",
-    "attach_head",
-    "convention_names",
-    "find_stance",
-    "wrapped",
-]
+    "ROOT", "SIDES", "AttachedHead", "BapSolver", "BodyDefinition", "BodyModel", "BodyPart", "Excess",
+    "GroundedPoser", "JointLimit", "JointLimits", "Skeleton", "attach_head", "convention_names",
+    "find_stance", "wrapped",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

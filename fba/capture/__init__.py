@@ -43,31 +43,12 @@ _NAMES = {
 """Public names by the module that they are imported from, on first use."""
 
 __all__ = [
-    "ActionUnitMotion",
-    "BoneError",
-    "Captured",
-    "FaceCapture",
-    "FeetError",
-    "MarkerMotion",
-    "PointMotion",
-    "RetargetReport",
-    "ShapeMotion",
-    "SkeletonMotion",
-    "SkeletonOptions",
-    "capture_options",
-    "from_action_units",
-    "from_blendshapes",
-    "from_markers",
-    "from_points",
-    "from_skeleton",
-    "make_animation",
-    "measure_bones",
-    "retarget_motion",
-    "retarget_report",
-    "shape_faps",
-    "shown_weights",
+    "ActionUnitMotion", "BoneError", "Captured", "FaceCapture", "FeetError", "MarkerMotion", "PointMotion",
+    "RetargetReport", "ShapeMotion", "SkeletonMotion", "SkeletonOptions", "capture_options",
+    "from_action_units", "from_blendshapes", "from_markers", "from_points", "from_skeleton",
+    "make_animation", "measure_bones", "retarget_motion", "retarget_report", "shape_faps", "shown_weights",
     "to_blendshapes",
-]
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

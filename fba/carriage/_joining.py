@@ -6,8 +6,8 @@ import math
 import warnings
 from fractions import Fraction
 
-from fba.carriage.counts import Counts
 from fba.carriage.payloads import Unit, full_configuration
+from fba.carriage.rtp import Counts
 from fba.codec import Decoder, marked_table, read_plane_start, replace_time_code, time_code
 from fba.errors import BitstreamError, FbaError, FbaWarning
 from fba.parameters import BapTable

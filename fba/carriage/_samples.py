@@ -192,8 +192,7 @@ def _restore(stream: bytes, planes: list[bytes], original: bytes, limits: Limits
         return b""  # a later program, or another has changed the samples
     if kind == _KEPT:
         return b"".join((head, *planes, tail))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         read = read_planes(stream, limits=limits)
         if len(read.settings) != count:
             return b""

@@ -6,8 +6,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 
-from fba.carriage._boxes import Box
-from fba.carriage._descriptors import AAC_OBJECT, VISUAL_OBJECT, read_esds
+from fba.carriage._boxes import AAC_OBJECT, VISUAL_OBJECT, Box, read_esds
 from fba.carriage._samples import OBJECT_CODE, PLANE_CODE, is_configuration
 from fba.errors import FormatError, Remedy
 

@@ -15,14 +15,15 @@ from typing import Literal
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int64
-from fba.carriage._boxes import write_box, write_full_box
-from fba.carriage._descriptors import (
+from fba.carriage._boxes import (
     AAC_OBJECT,
     AUDIO_STREAM,
     VISUAL_OBJECT,
     VISUAL_STREAM,
     Descriptor,
+    write_box,
     write_esds,
+    write_full_box,
 )
 from fba.carriage._samples import PlaneSamples, split_samples
 from fba.carriage._tracks import ORIGINAL_UUID

@@ -9,9 +9,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fba.carriage._joining import StreamJoiner
-from fba.carriage.counts import Counts
 from fba.carriage.payloads import SIZE_TABLE, PayloadKind, PayloadReader, SizeTable, split_start_codes
-from fba.carriage.rtp import CLOCK_RATE, PAYLOAD_TYPE, RtpPacket, read_packet
+from fba.carriage.rtp import CLOCK_RATE, PAYLOAD_TYPE, Counts, RtpPacket, read_packet
 from fba.errors import FormatError
 from fba.parameters import BapTable
 

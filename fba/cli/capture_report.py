@@ -151,8 +151,7 @@ def _find_motion(
         motion = read_capture(file.path, reading)
     if ready is None:
         asked = {name: options[name] for name in ("joints", "rest", "up")}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)  # the reader gave them
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):  # the reader gave them
             ready = prepare(motion, Skeleton.default(), **asked)
     return motion, ready
 

@@ -62,8 +62,7 @@ def spooled(source: BinaryIO, name: str, head: bytes = b"") -> Iterator[Path]:
 def renamed(path: Path, name: str) -> Iterator[None]:
     """Name a temporary file in errors and warnings as the user does."""
     try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", FbaWarning)
+        with warnings.catch_warnings(record=True, action="always", category=FbaWarning) as caught:
             yield
     except FbaError as error:
         error.args = (error.finding.replace(str(path), name),)

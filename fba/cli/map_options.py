@@ -205,8 +205,7 @@ def read_capture(path: Path, reading: Reading) -> Any:
     """Return the motion or the face in a capture, without warnings, which another reading gives."""
     from fba.formats import format_of
 
-    with input_file(path) as file, warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with input_file(path) as file, warnings.catch_warnings(action="ignore", category=FbaWarning):
         reader = format_of(file, reading.format)
         read = reader.read_motion or reader.read_face
         assert read is not None  # the caller names captures only

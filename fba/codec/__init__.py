@@ -3,7 +3,7 @@
 May use: parameters and the data model.
 """
 
-from fba.codec._block import Block
+from fba.codec._coded_frames import Block
 from fba.codec._decoder import Decoder, decode
 from fba.codec._encoder import ClampedParameter, Encoder, EncoderStatistics, encode_animation
 from fba.codec._frame_buffers import DecodedFrames, FrameBuffer
@@ -35,46 +35,11 @@ from fba.codec.settings import FrameRate, PartSettings, PlaneInfo, PlaneSettings
 from fba.encoder_options import EncoderOptions
 
 __all__ = [
-    "Block",
-    "ClampedParameter",
-    "Damage",
-    "DecodedFrames",
-    "Decoder",
-    "Encoder",
-    "EncoderOptions",
-    "EncoderStatistics",
-    "FrameBuffer",
-    "FrameRate",
-    "NextPlane",
-    "PartInfo",
-    "PartSettings",
-    "PlaneInfo",
-    "PlaneSettings",
-    "PlaneStart",
-    "RangeLists",
-    "StreamInfo",
-    "StreamPlanes",
-    "TimeCode",
-    "Verification",
-    "coarsest_quantisers",
-    "count_rounded",
-    "decode",
-    "digest",
-    "encode_animation",
-    "encode_planes",
-    "exact_quantisers",
-    "levels",
-    "marked_table",
-    "probe_stream",
-    "quantise",
-    "range_limit",
-    "read_plane_start",
-    "read_planes",
-    "recode",
-    "replace_time_code",
-    "step_scale",
-    "time_code",
-    "verify_stream",
-    "write_mark",
-    "write_opening",
-]
+    "Block", "ClampedParameter", "Damage", "DecodedFrames", "Decoder", "Encoder", "EncoderOptions",
+    "EncoderStatistics", "FrameBuffer", "FrameRate", "NextPlane", "PartInfo", "PartSettings", "PlaneInfo",
+    "PlaneSettings", "PlaneStart", "RangeLists", "StreamInfo", "StreamPlanes", "TimeCode", "Verification",
+    "coarsest_quantisers", "count_rounded", "decode", "digest", "encode_animation", "encode_planes",
+    "exact_quantisers", "levels", "marked_table", "probe_stream", "quantise", "range_limit",
+    "read_plane_start", "read_planes", "recode", "replace_time_code", "step_scale", "time_code",
+    "verify_stream", "write_mark", "write_opening",
+]  # fmt: skip

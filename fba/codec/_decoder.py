@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Literal
 
 from fba.animation import Animation, Frame
-from fba.codec._block import Block
+from fba.codec._coded_frames import Block
 from fba.codec._frame_buffers import CompactBuffer
 from fba.codec._stream.damage import Damage
 from fba.codec._stream.mark import find_marks

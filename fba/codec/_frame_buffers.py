@@ -15,8 +15,7 @@ import numpy as np
 
 from fba.animation import Animation, BodyTrack, FaceTrack
 from fba.arrays import Array, Bool, Int64
-from fba.codec._block import Block
-from fba.codec._coded_frames import CodedFrames, Masks
+from fba.codec._coded_frames import Block, CodedFrames, Masks
 from fba.codec._plane import slots, syntax
 from fba.codec._rows import GrowingMasks, Rows
 from fba.codec._stream.clock import DEFAULT_RATE

@@ -13,7 +13,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Int64
-from fba.codec._block import Block
+from fba.codec._coded_frames import Block
 from fba.codec._decoder import Decoder
 from fba.codec._frame_buffers import CompactBuffer
 from fba.codec._plane import slots, syntax

@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.animation import Animation
 from fba.arrays import Bool, Int64
-from fba.codec._block import Block
+from fba.codec._coded_frames import Block
 from fba.codec._decoder import read_blocks, reader_for
 from fba.codec._plane import header_loops
 from fba.codec._stream.damage import Damage

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Literal
 
-from fba.codec._block import Block
+from fba.codec._coded_frames import Block
 from fba.codec._plane import loops, syntax
 from fba.codec._plane.bits import OutOfDataError
 from fba.codec._plane.reader import PlaneReader, Planes
-from fba.codec._stream.buffer import Buffer
 from fba.codec._stream.checksums import CHECK_BYTES, PeriodChecks, find_wrong
 from fba.codec._stream.damage import Damage, DamageLog
 from fba.codec._stream.mark import MAX_MARK_BYTES, START, USER_DATA, Mark, bytes_needed
-from fba.codec._stream.object_borders import ObjectBorders
+from fba.codec._stream.object_borders import Buffer, ObjectBorders
 from fba.codec._stream.plane_times import PlaneTimes
 from fba.errors import BitstreamError, LimitError, UnsupportedError, warn
 from fba.limits import Limits

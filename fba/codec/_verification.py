@@ -85,8 +85,7 @@ def verify_stream(
     reader = reader_for(view, bap_steps=bap_steps, on_error="salvage", limits=limits)
     frames = CompactBuffer(limits, len(view))
     doubtful: set[int] = set()
-    with warnings.catch_warnings(record=True) as odd:
-        warnings.simplefilter("always", FbaWarning)
+    with warnings.catch_warnings(record=True, action="always", category=FbaWarning) as odd:
         for block in read_blocks(reader, view):
             frames.add(block)
             if block.doubtful:

@@ -18,7 +18,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from fba.arrays import Bool, Float64, Intp
-from fba.capture.blendshapes.action_units import unit_shapes
+from fba.capture.blendshapes.conversion import unit_shapes
 from fba.emotion._expression import FAMILIES
 from fba.emotion._expressions import expressions
 from fba.emotion._profiles import measured_faps, measurements

@@ -12,40 +12,16 @@ from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
 from fba.face.feature_points import names as feature_point_names
 from fba.face.feature_points import neutral_points
-from fba.face.interpolation._terms import Function, Link, Term
+from fba.face.interpolation._node import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import FaceModel, Material, Part, compact
 from fba.face.points import Eyeballs, FeaturePointFace
 from fba.face.shape_names import arkit_names, arkit_of
 
 __all__ = [
-    "EXPRESSION_NAMES",
-    "HEAD",
-    "VISEME_NAMES",
-    "Definitions",
-    "Deformer",
-    "Eyeballs",
-    "FaceDefMesh",
-    "FaceDefTables",
-    "FaceDefTransform",
-    "FaceModel",
-    "FaceSettings",
-    "Fapu",
-    "FeaturePointFace",
-    "Function",
-    "InterpolationTable",
-    "Link",
-    "Material",
-    "Part",
-    "Resolver",
-    "Term",
-    "arkit_names",
-    "arkit_of",
-    "compact",
-    "feature_point_names",
-    "fit_values",
-    "known_faps",
-    "neutral_points",
-    "resolve",
+    "EXPRESSION_NAMES", "HEAD", "VISEME_NAMES", "Definitions", "Deformer", "Eyeballs", "FaceDefMesh",
+    "FaceDefTables", "FaceDefTransform", "FaceModel", "FaceSettings", "Fapu", "FeaturePointFace",
+    "Function", "InterpolationTable", "Link", "Material", "Part", "Resolver", "Term", "arkit_names",
+    "arkit_of", "compact", "feature_point_names", "fit_values", "known_faps", "neutral_points", "resolve",
     "shown_faps",
-]
+]  # fmt: skip

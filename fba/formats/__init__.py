@@ -17,15 +17,6 @@ from fba.formats._registry import (
 from fba.formats.synchronisation import merge
 
 __all__ = [
-    "Format",
-    "OptionError",
-    "format_of",
-    "formats",
-    "merge",
-    "probe",
-    "read",
-    "read_face",
-    "read_motion",
-    "write",
-    "writer_for",
-]
+    "Format", "OptionError", "format_of", "formats", "merge", "probe", "read", "read_face", "read_motion",
+    "write", "writer_for",
+]  # fmt: skip

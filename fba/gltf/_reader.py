@@ -22,14 +22,9 @@ from fba.source import Path
 PACKED = {"KHR_meshopt_compression": "meshopt-compressed buffers"}
 """Extensions by which the geometry itself is compressed."""
 KNOWN = {
-    "KHR_draco_mesh_compression",
-    "EXT_meshopt_compression",
-    "EXT_texture_webp",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-    "KHR_lights_punctual",
-    "FBA_face",
-}
+    "KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_texture_webp", "KHR_mesh_quantization",
+    "KHR_texture_transform", "KHR_lights_punctual", "FBA_face",
+}  # fmt: skip
 """Extensions that a file may require: they are read, or do not change shapes."""
 CHANNEL_TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 """Type of the elements of an animated property."""

@@ -11,10 +11,9 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Self
 
-from fba.carriage.counts import Counts
 from fba.carriage.payloads import PayloadKind
 from fba.carriage.receiving import DELAY, DatagramReader, PacketReader, RtpReader
-from fba.carriage.rtp import FrameReader, write_frame
+from fba.carriage.rtp import Counts, FrameReader, write_frame
 from fba.carriage.sdp import Session
 from fba.carriage.sending import END_COPIES, DatagramWriter, PacketWriter, RtpWriter
 from fba.errors import FbaError

@@ -21,24 +21,7 @@ from fba.mesh._vrml import read_vrml
 from fba.mesh._wfm import read_wfm
 
 __all__ = [
-    "Alpha",
-    "Material",
-    "Mesh",
-    "Meshes",
-    "Pictures",
-    "Polygons",
-    "UniqueNames",
-    "checked_rows",
-    "connected",
-    "join_rows",
-    "mesh_arrays",
-    "read_mtl",
-    "read_obj",
-    "read_pixels",
-    "read_ply",
-    "read_vrml",
-    "read_wfm",
-    "result_array",
-    "triangulate",
-    "vertex_normals",
-]
+    "Alpha", "Material", "Mesh", "Meshes", "Pictures", "Polygons", "UniqueNames", "checked_rows",
+    "connected", "join_rows", "mesh_arrays", "read_mtl", "read_obj", "read_pixels", "read_ply", "read_vrml",
+    "read_wfm", "result_array", "triangulate", "vertex_normals",
+]  # fmt: skip

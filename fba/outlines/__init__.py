@@ -11,37 +11,16 @@ Emotional facial animation by motion capture, chapter 4 (thesis, Bilkent Univers
 bodies, which it draws itself, without OpenGL.
 """
 
-from fba.outlines._distance import earth_movers_distance, lower_bounds, outline_distances
 from fba.outlines._figure import Figure
 from fba.outlines._index import Choice, Hit, Index, build_index, follow, nearest
 from fba.outlines._mask import fit_mask, read_mask
-from fba.outlines._methods import Method, methods
+from fba.outlines._methods import Method, earth_movers_distance, lower_bounds, methods, outline_distances
 from fba.outlines._raster import View, draw_silhouette
 from fba.outlines._sheet import draw_sheet
 from fba.outlines._tree import Nodes, Tree, build_tree, embed_l1, embed_l2, find_nodes
 
 __all__ = [
-    "Choice",
-    "Figure",
-    "Hit",
-    "Index",
-    "Method",
-    "Nodes",
-    "Tree",
-    "View",
-    "build_index",
-    "build_tree",
-    "draw_sheet",
-    "draw_silhouette",
-    "earth_movers_distance",
-    "embed_l1",
-    "embed_l2",
-    "find_nodes",
-    "fit_mask",
-    "follow",
-    "lower_bounds",
-    "methods",
-    "nearest",
-    "outline_distances",
-    "read_mask",
-]
+    "Choice", "Figure", "Hit", "Index", "Method", "Nodes", "Tree", "View", "build_index", "build_tree",
+    "draw_sheet", "draw_silhouette", "earth_movers_distance", "embed_l1", "embed_l2", "find_nodes",
+    "fit_mask", "follow", "lower_bounds", "methods", "nearest", "outline_distances", "read_mask",
+]  # fmt: skip

@@ -20,11 +20,17 @@ from fba.body import BodyModel
 from fba.errors import FbaError, LimitError
 from fba.face import FaceModel
 from fba.limits import DEFAULT_LIMITS, Limits
-from fba.outlines._distance import Ground, earth_movers_distance, lower_bounds, outline_distances, project
 from fba.outlines._figure import Figure, read_poses
 from fba.outlines._index_file import CANVAS, Stored, Stream, pack_mask, read_index, unpack_mask, write_index
 from fba.outlines._mask import fit_mask, without_specks
-from fba.outlines._methods import describe_points
+from fba.outlines._methods import (
+    Ground,
+    describe_points,
+    earth_movers_distance,
+    lower_bounds,
+    outline_distances,
+    project,
+)
 from fba.outlines._raster import View, draw_silhouette
 from fba.parameters import BAP_COUNT, FAP_COUNT, FIRST_LOW_LEVEL_FAP, bap_angles
 from fba.tracks import BodyTrack, FaceTrack

@@ -36,13 +36,9 @@ BAP_STEPS_AUTO: Final = "auto"
 
 VISEME_FIELDS = ("viseme_select1", "viseme_select2", "viseme_blend", "viseme_def")
 EXPRESSION_FIELDS = (
-    "expression_select1",
-    "expression_intensity1",
-    "expression_select2",
-    "expression_intensity2",
-    "init_face",
-    "expression_def",
-)
+    "expression_select1", "expression_intensity1", "expression_select2", "expression_intensity2",
+    "init_face", "expression_def",
+)  # fmt: skip
 VISEME_SELECT_MAX = 14
 EXPRESSION_SELECT_MAX = 6
 FULL_TURN = 628319

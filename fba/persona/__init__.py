@@ -15,16 +15,6 @@ from fba.persona.points import TrackedFace, from_point_motion
 from fba.persona.recognition import ClassRecogniser
 
 __all__ = [
-    "ClassRecogniser",
-    "LivePersona",
-    "PartStyle",
-    "Performance",
-    "Persona",
-    "TrackedFace",
-    "animate_as",
-    "from_point_motion",
-    "learn",
-    "read_recording",
-    "transfer",
-    "write_recording",
-]
+    "ClassRecogniser", "LivePersona", "PartStyle", "Performance", "Persona", "TrackedFace", "animate_as",
+    "from_point_motion", "learn", "read_recording", "transfer", "write_recording",
+]  # fmt: skip

@@ -9,9 +9,9 @@ from fba.arrays import Float64
 from fba.choices import Means
 from fba.errors import ModelError
 from fba.parameters import FAP_COUNT
+from fba.persona._observation import NEUTRAL_FRAMES
 from fba.persona._performance import DEFAULT_MEANS, HEAD, MAPPED, choose_masks, usable_means, user_maps
 from fba.persona._persona import Persona
-from fba.persona._rest import NEUTRAL_FRAMES
 from fba.persona._restyle import Follower, keep_shut
 from fba.persona.motion import flatten, unflatten
 from fba.persona.points._tracked import MAX_MISFIT, MAX_TURN, register_points

@@ -11,8 +11,7 @@ from fba.atomic import atomic
 from fba.capture import PointMotion
 from fba.errors import FormatError, ModelError
 from fba.formats import format_of
-from fba.formats.numpy_archives import read_arrays
-from fba.formats.zip_files import ZIP
+from fba.formats.zip_files import ZIP, read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.persona.points import TrackedFace, from_point_motion
 from fba.persona.points.layout import TRACKED

@@ -12,21 +12,7 @@ from fba.planning._stillness import hold_still
 from fba.planning._tolerance import BodyErrors, FaceErrors, NearLossless, Tolerance
 
 __all__ = [
-    "BitRate",
-    "BodyErrors",
-    "Encoded",
-    "FaceErrors",
-    "Goal",
-    "LiveEncoder",
-    "NearLossless",
-    "Plan",
-    "Tolerance",
-    "body_errors",
-    "encode",
-    "encode_planned",
-    "encode_stream",
-    "encode_within_tolerance",
-    "hold_still",
-    "plan_compact",
-    "plan_exact",
-]
+    "BitRate", "BodyErrors", "Encoded", "FaceErrors", "Goal", "LiveEncoder", "NearLossless", "Plan",
+    "Tolerance", "body_errors", "encode", "encode_planned", "encode_stream", "encode_within_tolerance",
+    "hold_still", "plan_compact", "plan_exact",
+]  # fmt: skip

@@ -97,8 +97,7 @@ def _encode_face(
     data, statistics = encode_planned(animation, options, preset="compact")
     smallest = _measured(data, statistics, source, options, compact=True)
     if animation.face is not None and _is_plain(animation.face):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)  # given above
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):  # given above
             for plan in _search(source, tolerance):
                 try:
                     found_data, statistics = plan.encode()
@@ -129,8 +128,7 @@ class _Source:
     def plan(self) -> Plan:
         """Return the plan that keeps all that is shown."""
         face_only = replace(self.animation, body=None)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             if self.fit is not None:
                 return plan_exact(face_only, self.options)
             return plan_compact(face_only, self.options, intra_bits=TUNING.intra_bits)

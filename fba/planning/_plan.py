@@ -101,8 +101,7 @@ def _as_coded(
     """Return an animation with the values that its stream has. statistics: of the encoder."""
     if not statistics.clamped and not count_rounded(animation, options):
         return animation
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         coded = decode(data, bap_steps=options.bap_steps, limits=NO_LIMITS)
     face, body = animation.face, animation.body
     if face is not None and coded.face is not None:

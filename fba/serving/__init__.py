@@ -31,16 +31,6 @@ from fba.serving._planes import Plane, PlaneSplitter, split_stream
 from fba.serving._server import MOST_VIEWERS, Server, listen
 
 __all__ = [
-    "MOST_VIEWERS",
-    "Pace",
-    "Plane",
-    "PlaneSplitter",
-    "Server",
-    "Stage",
-    "arriving",
-    "listen",
-    "paced",
-    "show_file",
-    "show_pipe",
-    "split_stream",
-]
+    "MOST_VIEWERS", "Pace", "Plane", "PlaneSplitter", "Server", "Stage", "arriving", "listen", "paced",
+    "show_file", "show_pipe", "split_stream",
+]  # fmt: skip

@@ -16,24 +16,7 @@ from fba.speech._visemes import read_shapes
 from fba.speech._voices import speak_text
 
 __all__ = [
-    "RATE",
-    "Coding",
-    "LiveSpeech",
-    "Phone",
-    "Prosody",
-    "Shape",
-    "Speech",
-    "VisemeFormat",
-    "Word",
-    "encoder_options",
-    "enliven",
-    "find_shapes",
-    "find_speech",
-    "find_timings",
-    "format_visemes",
-    "perform",
-    "read_shapes",
-    "read_timings",
-    "speak_text",
-    "split_text",
-]
+    "RATE", "Coding", "LiveSpeech", "Phone", "Prosody", "Shape", "Speech", "VisemeFormat", "Word",
+    "encoder_options", "enliven", "find_shapes", "find_speech", "find_timings", "format_visemes", "perform",
+    "read_shapes", "read_timings", "speak_text", "split_text",
+]  # fmt: skip

@@ -54,34 +54,11 @@ _NAMES = {
 """Public names by the module that they are imported from, on first use."""
 
 __all__ = [
-    "Audio",
-    "Camera",
-    "CompareScene",
-    "Expression",
-    "LiveAnimation",
-    "LiveTimeline",
-    "Offscreen",
-    "Preview",
-    "Puppet",
-    "Recorder",
-    "Renderer",
-    "Scene",
-    "Subject",
-    "Surface",
-    "TakeRecorder",
-    "Timeline",
-    "Transport",
-    "check_display",
-    "contact_sheet",
-    "default_camera",
-    "draw_side_by_side",
-    "film_sheet",
-    "open_audio",
-    "play",
-    "record",
-    "render",
-    "to_pyrender",
-]
+    "Audio", "Camera", "CompareScene", "Expression", "LiveAnimation", "LiveTimeline", "Offscreen",
+    "Preview", "Puppet", "Recorder", "Renderer", "Scene", "Subject", "Surface", "TakeRecorder", "Timeline",
+    "Transport", "check_display", "contact_sheet", "default_camera", "draw_side_by_side", "film_sheet",
+    "open_audio", "play", "record", "render", "to_pyrender",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -262,8 +262,7 @@ def test_a_process_that_dies_takes_its_item_alone() -> None:
     failed = {one.item: one.error for one in outcomes if one.error}
     assert sorted(failed) == [7, 11, 13]
     assert "was ended; is the memory full?" in failed[7]
-    assert failed[11] == "eleven"
-    assert failed[13] == "not enough memory for it"
+    assert (failed[11], failed[13]) == ("eleven", "not enough memory for it")
     assert outcomes[19] == Outcome(19, 361)
 
 

@@ -2,7 +2,6 @@
 
 import importlib.util
 import re
-import wave
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +11,14 @@ from scipy.signal import resample_poly
 from fba.arrays import Int16
 from fba.audio import find_duration, read_mono
 from fba.errors import DisplayError
+from sound_clicks import write_wave
 
 
 def write_tone(path: Path, rate: int, channels: int, width: int = 2) -> None:
     """Three seconds of 440 Hz, in all channels."""
     tone = 8000 * np.sin(2 * np.pi * 440 * np.arange(3 * rate) / rate)
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(channels)
-        file.setsampwidth(width)
-        file.setframerate(rate)
-        samples = np.repeat(tone.astype("<i2"), channels).tobytes()
-        file.writeframes(samples if width == 2 else bytes(3 * rate * channels * width))
+    samples = np.repeat(tone, channels) if width == 2 else bytes(3 * rate * channels * width)
+    write_wave(path, samples, rate, channels, width)
 
 
 def without_pyav(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,10 +52,7 @@ def test_blocks_leave_no_seams(rate: int, tmp_path: Path, monkeypatch: pytest.Mo
     """By the standard library, block by block, noise becomes what it becomes at once."""
     without_pyav(monkeypatch)
     noise = np.random.default_rng(4).integers(-9000, 9000, 3 * rate + 77).astype("<i2")
-    path = tmp_path / "noise.wav"
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, rate, len(noise), "NONE", ""))
-        file.writeframes(noise.tobytes())
+    path = write_wave(tmp_path / "noise.wav", noise, rate)
     common = np.gcd(rate, 16000)
     whole = resample_poly(noise.astype(np.float64), 16000 // common, rate // common)
     samples = read(path)

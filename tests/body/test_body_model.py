@@ -66,7 +66,6 @@ def test_it_has_the_size_of_a_person_and_stands_on_the_ground() -> None:
     low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
     posture = body.skin(BapSolver(body.skeleton).pose(np.zeros(296)))
     assert posture[:, 1].min() == pytest.approx(0, abs=1e-3)
-    assert body.eyes is not None
     assert body.eyes[:, 1] == pytest.approx(1.65, abs=0.03)
     assert high[1] < body.eyes[0, 1]  # no head
     assert 1.2 < high[0] - low[0] < 1.4  # arms held off the sides

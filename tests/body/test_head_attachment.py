@@ -136,7 +136,6 @@ def test_another_face_is_sized_by_its_pupils() -> None:
     other = attach_head(body, model.vertices * 100 + shift, pupils(model) * 100 + shift)
     assert other.place[0, 0] == pytest.approx(0.01, rel=1e-6)
     assert other.brings_neck
-    assert body.eyes is not None
     found = other.place[:3, :3] @ (pupils(model)[0] * 100 + shift) + other.place[:3, 3]
     np.testing.assert_allclose(found, body.eyes[0], atol=1e-6)
     matrices = posed(**NOD)

@@ -60,7 +60,6 @@ def test_walks(character: str, rate: int, made: str, quant: int) -> None:
     walk = gait.walk(character=character, rate=rate)
     assert doubt_of(walk, made, made, quant) is None
     found = doubt_of(walk, made, OTHER[made], quant)
-    assert found is not None
     assert (found.used, found.likely) == (OTHER[made], made)
 
 
@@ -79,7 +78,6 @@ def test_somebody_who_sits_far_under_the_ground() -> None:
     seat = root_moves(np.full(60, -380))
     assert doubt_of(seat, "visage", "visage") is None
     found = doubt_of(seat, "visage", "iso")
-    assert found is not None
     assert found.findings == ("the body 12 m under the ground",)
 
 
@@ -97,7 +95,6 @@ def test_nothing_is_said_where_both_tables_look_wrong() -> None:
     )
     assert doubt(wild, "iso") is None
     steps = bap_steps("visage")
-    assert wild.body is not None
     levels = wild.body.values // bap_steps("iso")
     assert doubt(Animation(30, wild.index, None, BodyTrack(levels * steps, wild.body.mask)), "visage") is None
 
@@ -121,7 +118,6 @@ def test_a_moment_is_too_short_to_judge() -> None:
 
 def test_frames_without_a_body_do_not_count_as_jumps() -> None:
     animation = root_moves(np.full(60, 64))
-    assert animation.body is not None
     values, mask = animation.body.values.copy(), animation.body.mask.copy()
     values[20:40], mask[20:40] = 0, False
     assert doubt(Animation(30, animation.index, None, BodyTrack(values, mask)), "iso") is None
@@ -189,7 +185,6 @@ def test_a_jump_is_no_travel_of_the_root() -> None:
     times = np.arange(60) / 30
     for height, travels in ((950, False), (1050, True)):
         hop = root_moves(np.rint(height * (1 - (2 * (times % 1) - 1) ** 2)).astype(int))
-        assert hop.body is not None
         found = plausibility.measure(hop.body.values.astype(np.int64), hop.index, hop.rate)
         assert (found.travel > 0.5) == travels
 
@@ -207,7 +202,6 @@ def test_an_unknown_table_is_refused() -> None:
 
 def test_of_a_long_motion_a_part_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     walk = fba.decode(fba.encode(gait.walk(cycles=8), EncoderOptions(bap_steps="visage", mark=False)))
-    assert walk.body is not None
     count = 20_000
     rows = np.arange(count) % len(walk)
     body = BodyTrack(walk.body.values[rows], walk.body.mask[rows])
@@ -220,7 +214,6 @@ def test_of_a_long_motion_a_part_is_looked_at(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(plausibility, "measure", counting)
     found = find_doubt(body, np.arange(count), Fraction(30), "iso")
-    assert found is not None
     assert found.likely == "visage"
     assert seen == [2048, 2048]
 
@@ -240,8 +233,7 @@ def test_the_projects_own_vectors() -> None:
     for record in json.loads((folder / "index.json").read_text(encoding="utf-8")):
         if "error" in record:
             continue
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", fba.FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=fba.FbaWarning):
             decoded = fba.decode((folder / record["stream"]).read_bytes(), bap_steps=record["bap_steps"])
         assert decoded.body is None or doubt(decoded, record["bap_steps"]) is None, record["stream"]
 

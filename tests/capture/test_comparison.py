@@ -62,8 +62,7 @@ def test_a_result_as_it_should_be_is_good(
     source: SkeletonMotion, result: Animation, mapped: dict[str, int]
 ) -> None:
     comparison = compare(source, result, mapped)
-    assert comparison.verdict == "good"
-    assert comparison.reasons == ()
+    assert (comparison.verdict, comparison.reasons) == ("good", ())
     assert comparison.frames == FRAMES
     assert find(comparison, "direction", "left forearm").worst < 1
     assert find(comparison, "foot", "left foot").worst < 3
@@ -123,8 +122,7 @@ def test_a_flip_for_one_frame_is_a_jump(
     one = find(comparison, "jump", "pelvis")
     assert one.worst == pytest.approx(178, abs=1)
     assert one.frame in (7, 8)
-    assert comparison.verdict == "poor"
-    assert comparison.differences[0].measure == "jump"
+    assert (comparison.verdict, comparison.differences[0].measure) == ("poor", "jump")
     assert find(comparison, "direction", "line of the hips").worst < 1  # it does not last
 
 

@@ -21,7 +21,7 @@ from fba.face import Deformer, FaceModel
 from fba.face.authoring import author
 from fba.limits import Limits
 from fba.parameters import faps, point_rows
-from small_head import adult_points, small_head
+from small_head import adult_points, authored_head, small_head
 from tools.captures.marked_actor import NAMES, Take, perform
 
 TURNED = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -31,11 +31,9 @@ EXACT = {18: 30}
 """Thousandths of FAPU, root mean square, where the lower lip carries the skin of a coarse mask too far."""
 
 
-@cache
 def actor() -> FaceModel:
     """Another head than the built-in one, by whose motions the encoder tells FAPs apart."""
-    head = small_head(cell=0.005)
-    return author(head.parts, head.points, bound=head.bound)
+    return authored_head(0.005)
 
 
 @cache

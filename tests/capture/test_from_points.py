@@ -123,8 +123,7 @@ def test_frames_without_a_face_are_bridged() -> None:
     motion = replace(deep_take().motion, positions=positions, aspect=16 / 9)
     with pytest.warns(FbaWarning, match=r"15 of 240 frames have no face; they are bridged, 0\.53 s at most"):
         animation = from_points(motion)
-    assert len(animation) == 240
-    assert animation.body is None
+    assert (len(animation), animation.body) == (240, None)
 
 
 def test_the_neutral_face_of_a_film_is_found() -> None:
@@ -185,8 +184,7 @@ def test_brows_held_throughout_are_shown_in_part_and_reported(mood: str, way: in
         face = find_point_face(take.motion)
     brows = face.faps[:, [*INNER, *MIDDLE]].mean()
     assert brows * way > 30
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", FbaWarning)
+    with warnings.catch_warnings(action="error", category=FbaWarning):
         face = find_point_face(take.motion, neutral=5)  # who says what is neutral, is believed
     assert abs(face.faps[:, [*INNER, *MIDDLE]].mean()) < 40
 
@@ -200,8 +198,7 @@ def test_doubtful_brows_are_reported() -> None:
 @pytest.mark.parametrize("name", ["mediapipe_single_face", "mediapipe_WolfgangLanger_Pexels"])
 def test_brows_of_real_films_rest_as_they_mostly_are(shared: Path, name: str) -> None:
     motion = read_points(shared / f"data/capture/{name}.csv")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", FbaWarning)
+    with warnings.catch_warnings(action="error", category=FbaWarning):
         warnings.filterwarnings("ignore", "eyes that turn further")
         face = find_point_face(replace(motion, aspect=16 / 9))
     for columns in (INNER, MIDDLE, OUTER):

@@ -17,7 +17,7 @@ from fba.capture import SkeletonMotion, from_skeleton, retarget_report
 from fba.capture.bones import match
 from fba.capture.comparison._figure import find_up, result_figure, source_figure
 from fba.capture.comparison._measurement import sole_heights, source_scale
-from fba.capture.comparison._standing import find_floor, find_standing
+from fba.capture.comparison._path_measures import find_floor, find_standing
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.formats.bvh import _reader as reader
 from fba.parameters import bap_numbers, baps
@@ -213,8 +213,7 @@ def test_resampling_turns_by_slerp() -> None:
     turns = {"LeftArm": Rotation.from_rotvec(np.outer([0, -40, -80], [1, 0, 0]), degrees=True)}
     captured = motion("standing", 3, turns=turns, rate=Fraction(30))
     animation = from_skeleton(captured, 60)
-    assert animation.rate == 60
-    assert len(animation) == 5
+    assert (animation.rate, len(animation)) == (60, 5)
     flexion = value(animation, "l_shoulder_flexion")
     np.testing.assert_allclose(np.diff(flexion), np.radians(20) * 1e5, rtol=0.02)
     assert len(from_skeleton(captured, "30000/1001")) == 2

@@ -220,8 +220,7 @@ def test_a_frame_that_is_not_there() -> None:
 def test_a_file_with_other_axes_is_trusted(posture: str, up: str) -> None:
     """Its rest pose stands along them. Somebody who stands, crawls or turns leaves no doubt."""
     made = turned(POSTURES[posture](), UPS[up])
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         assert prepare(made, SKELETON).up == up
     assert posture not in UPRIGHT or not caught
     assert all("if another axis points up, say which with up=" in str(each.message) for each in caught)
@@ -244,8 +243,7 @@ def test_the_axis_of_the_format_needs_no_warning(posture: str) -> None:
     """As in glTF, where up is +y."""
     for up, world in UPS.items():
         made = replace(turned(POSTURES[posture](), world), up=up)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             ready = prepare(made, SKELETON)
         assert ready.up == up
         np.testing.assert_allclose(find_up(made, ready.mapped)[1], world.apply([0, 1, 0]), atol=1e-9)
@@ -281,7 +279,6 @@ def test_a_rest_pose_that_may_be_wrong_is_doubted(posture: str, up: str) -> None
 def test_without_a_rest_pose_the_floor_decides(posture: str, up: str, said: bool) -> None:
     """All bones lie along x at rest."""
     made = along_x(turned(POSTURES[posture](), UPS[up]))
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         assert prepare(made, SKELETON).up == up
     assert bool(caught) == said

@@ -19,7 +19,7 @@ from fba.capture.virtual_markers import (
     propose_mapping,
 )
 from fba.capture.virtual_markers.influence import WalkedMesh, give_to_nearest
-from fba.capture.virtual_markers.weights import find_weights
+from fba.capture.virtual_markers.mapping import find_weights
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face import Deformer, FaceModel
 from fba.face.authoring.surface.landmarks import find_landmarks
@@ -451,8 +451,7 @@ def test_teeth_and_lashes_go_with_the_face() -> None:
 
 def test_markers_in_a_mirrored_capture_move_the_right_side() -> None:
     mirrored = replace(take().motion, positions=take().motion.positions * (1, 1, -1))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         expected = move_head(take().motion, head(), proposed())
     with pytest.warns(FbaWarning, match="the capture is mirrored"):
         shown = move_head(mirrored, head(), proposed())

@@ -58,8 +58,7 @@ def test_the_same_bytes_come_out_again(name: str, fragment: float | None) -> Non
     stream = STREAMS[name]
     if name == "two_objects":
         pytest.skip("see below")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # of the one without an end code
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):  # of the one without an end code
         read = read_mp4(write_mp4(stream, fragment=fragment))
         if name in ("no_end_code", "old_start_codes"):
             assert fba.decode(read.stream) == fba.decode(stream)
@@ -211,8 +210,7 @@ def test_checks_of_a_stream_find_flipped_bits() -> None:
     found = 0
     for at in range(len(data) - 2000, len(data), 97):
         data[at] ^= 0x10
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             found += not verify_stream(read_mp4(bytes(data)).stream).intact
         data[at] ^= 0x10
     assert found == 21
@@ -224,12 +222,11 @@ def test_objects_that_fit_into_one_track_and_others() -> None:
     )
     joined = first + second
     assert fba.decode(read_mp4(write_mp4(joined)).stream) == fba.decode(joined)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # of the second table
-        with pytest.raises(
-            UnsupportedError, match="do not fit into one track; make one object of them first"
-        ):
-            write_mp4(_marked_otherwise())
+    with (
+        warnings.catch_warnings(action="ignore", category=FbaWarning),  # of the second table
+        pytest.raises(UnsupportedError, match="do not fit into one track; make one object of them first"),
+    ):
+        write_mp4(_marked_otherwise())
 
 
 def _marked_otherwise() -> bytes:
@@ -285,8 +282,7 @@ def test_reading_and_writing_by_name(tmp_path: Path) -> None:
     animation = face(*range(30))
     fba.write(path, animation, fragment=0.5, intra_period=Fraction(1, 5), sound=SOUND)
     assert fba.read(path) == animation
-    assert fba.probe(path).format == "mp4"
-    assert fba.probe(path).intra_planes == 6
+    assert (fba.probe(path).format, fba.probe(path).intra_planes) == ("mp4", 6)
     assert [track.kind for track in list_tracks(path.read_bytes())] == ["vide", "soun"]
 
 

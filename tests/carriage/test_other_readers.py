@@ -7,7 +7,6 @@ is a system package (`./dev system ffmpeg`), mp4box.js comes with `./dev web`, t
 import json
 import shutil
 import subprocess
-import wave
 from fractions import Fraction
 from hashlib import sha256
 from itertools import pairwise
@@ -23,6 +22,7 @@ from fba.carriage.mp4 import PlaneSamples, SoundTrack, list_tracks, read_mp4, sp
 from fba.codec import encode_animation
 from fba_player.sound.coded_sound import read_coded_sound
 from joinable_streams import JOINABLE, performance
+from sound_clicks import write_wave
 
 ROOT = Path(__file__).parents[2]
 MP4BOX = ROOT / "player/fba_player/web/node_modules/mp4box/dist/mp4box.all.mjs"
@@ -45,11 +45,7 @@ def skipping() -> Animation:
 
 def voice(folder: Path) -> SoundTrack:
     """A second of a tone as AAC."""
-    path = folder / "tone.wav"
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, 48_000, 0, "NONE", ""))
-        file.writeframes((8000 * np.sin(np.arange(48_000) / 20)).astype("<i2").tobytes())
-    return read_coded_sound(path)
+    return read_coded_sound(write_wave(folder / "tone.wav", 8000 * np.sin(np.arange(48_000) / 20), 48_000))
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -94,15 +90,9 @@ def test_pyav(made: tuple[Path, bytes, PlaneSamples]) -> None:
 def test_ffprobe(made: tuple[Path, bytes, PlaneSamples]) -> None:
     path, _, samples = made
     asked = [
-        "-show_packets",
-        "-show_streams",
-        "-show_data_hash",
-        "sha256",
-        "-select_streams",
-        "v",
-        "-of",
+        "-show_packets", "-show_streams", "-show_data_hash", "sha256", "-select_streams", "v", "-of",
         "json",
-    ]
+    ]  # fmt: skip
     done = subprocess.run(["ffprobe", "-v", "fatal", *asked, str(path)], capture_output=True, check=True)
     found = json.loads(done.stdout)
     (stream,) = found["streams"]

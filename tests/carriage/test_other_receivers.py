@@ -48,14 +48,8 @@ def test_tshark_dissects_every_packet(tmp_path: Path, kind: str, planes_per_pack
     write_pcap(tmp_path / "a.pcap", packets)
     decode = ["-d", "rtp.pt==96,mp4v-es"] if kind == "6416" else []
     names = (
-        "rtp.version",
-        "rtp.p_type",
-        "rtp.seq",
-        "rtp.timestamp",
-        "rtp.ssrc",
-        "rtp.marker",
-        "_ws.malformed",
-    )
+        "rtp.version", "rtp.p_type", "rtp.seq", "rtp.timestamp", "rtp.ssrc", "rtp.marker", "_ws.malformed",
+    )  # fmt: skip
     fields = [part for name in names for part in ("-e", name)]
     rows = dissected(tmp_path / "a.pcap", *decode, "-T", "fields", *fields)
     assert len(rows) == len(packets)
@@ -109,8 +103,7 @@ def test_ffmpeg_takes_the_planes_out_of_rfc_6416(tmp_path: Path) -> None:
     try:
         with av.open(str(tmp_path / "a.sdp"), options=options, timeout=60) as opened:
             codec: Any = opened.streams[0].codec_context
-            assert codec.name == "mpeg4"
-            assert codec.profile == "Simple Face Animation Profile"
+            assert (codec.name, codec.profile) == ("mpeg4", "Simple Face Animation Profile")
             assert codec.extradata == configuration
             found = []
             for packet in opened.demux():

@@ -181,8 +181,7 @@ def test_info(run: Run, tmp_path: Path, face_file: Path, face: Animation) -> Non
     assert "2 FAPs: 3, 48; quantiser 1" in out
     assert f"{face_file}: FAP" in out
     report = json.loads(run("info", "--json", stream).out)
-    assert report["frames"] == 50
-    assert report["intra_planes"] == 2
+    assert (report["frames"], report["intra_planes"]) == (50, 2)
     assert report["face"]["parameters"] == [3, 48]
     assert len(json.loads(run("info", "--json", stream, face_file).out)) == 2
 
@@ -253,8 +252,7 @@ def test_conformance_of_programs(run: Run, tmp_path: Path) -> None:
     out = run("conformance", "--only", "jaw", "--decoder", silent, "--junit", report, code=1).out
     assert "valid/jaw.fba: decoded WRONG, encoded -: wrote no file" in out
     (case,) = ElementTree.parse(report).getroot()
-    assert case.attrib["name"] == "valid/jaw.fba"
-    assert case[0].attrib["message"] == "wrote no file"
+    assert (case.attrib["name"], case[0].attrib["message"]) == ("valid/jaw.fba", "wrote no file")
     out = run("conformance", "--only", "jaw", "--encoder", silent, "--json", code=1).out
     assert [(one["encoded"], one["message"]) for one in json.loads(out)] == [(False, "wrote no file")]
     for arguments, text in (

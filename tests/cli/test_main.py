@@ -84,8 +84,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(tmp_path: Path, face: Animati
     fba.write(path, face)
     shell = f"'{sys.executable}' -m fba info --trace '{path}' | head -n 1"
     result = subprocess.run(["sh", "-c", shell], capture_output=True, text=True, check=False)
-    assert result.stdout.splitlines() == ["      bit   bits  plane  element"]
-    assert result.stderr == ""
+    assert (result.stdout.splitlines(), result.stderr) == (["      bit   bits  plane  element"], "")
 
 
 def test_the_folder_has_the_samples_and_the_stream_made_of_them(

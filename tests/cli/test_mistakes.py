@@ -225,8 +225,7 @@ def test_one_bad_file_of_several_is_named_and_the_others_go_on(
     more = {"bench": ["--rounds", "1"], "decode": ["--fap", str(tmp_path)]}.get(command, [])
     _, out, err = run(command, *streams, *more, code=1)
     assert err.startswith(f"fba: error: {streams[1]}: ")
-    assert err.count("two.fba") == 1
-    assert err.count("\n") == 1
+    assert (err.count("two.fba"), err.count("\n")) == (1, 1)
     assert out.count("one.fba") == out.count("three.fba") == 1
     if command == "decode":
         assert sorted(path.name for path in tmp_path.glob("*.fap")) == ["one.fap", "three.fap"]

@@ -54,16 +54,8 @@ def test_a_table_is_learned_stored_and_written(run: Run, here: Path) -> None:
 
 def test_figures_for_programs(run: Run, here: Path) -> None:
     line = [
-        "model",
-        "learn-fit",
-        "monday.fap",
-        "tuesday.fap",
-        "--model",
-        "head.glb",
-        "-o",
-        "ada.glb",
-        "--json",
-    ]
+        "model", "learn-fit", "monday.fap", "tuesday.fap", "--model", "head.glb", "-o", "ada.glb", "--json",
+    ]  # fmt: skip
     out = run(*line, "--tolerance", "0.5mm").out
     said = json.loads(out)
     assert said["output"] == "ada.glb"
@@ -107,8 +99,7 @@ def test_a_stream_leaves_to_the_head_what_it_computes(run: Run, here: Path) -> N
     _, out, err = run("encode", "monday.fap", "-o", "small.fba", "--fit", "ada.glb", "--json")
     assert err == ""
     said = json.loads(out)["fit"]
-    assert len(said["sent"]) == 3
-    assert said["added"] == []
+    assert (len(said["sent"]), said["added"]) == (3, [])
     assert said["millimetres"]["largest"] <= 0.01  # the small head shows the jaw alone
     run("encode", "monday.fap", "-o", "all.fba", "--preset", "compact")
     assert Path("small.fba").stat().st_size < Path("all.fba").stat().st_size

@@ -6,7 +6,6 @@
 import os
 import threading
 import time
-import wave
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from fba.body import BodyModel
 from fba.face import FaceModel
 from fba_player.playback.live import LiveAnimation
 from fba_player.scene.compare import CompareScene
+from sound_clicks import write_wave
 
 
 class Window:
@@ -57,15 +57,6 @@ def talk(tmp_path: Path, face: Animation) -> Path:
     return tmp_path / "talk.fba"
 
 
-def write_wav(path: Path) -> Path:
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(8000)
-        file.writeframes(np.zeros(800, dtype=np.int16).tobytes())
-    return path
-
-
 def test_a_file_is_played(run: Run, window: Window, talk: Path) -> None:
     run("play", talk)
     assert window.scene.timeline.frames == 50
@@ -88,14 +79,14 @@ def test_options_reach_the_window(run: Run, window: Window, talk: Path) -> None:
 
 
 def test_the_sound_beside_it_is_found(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
-    sound = write_wav(tmp_path / "talk.wav")
+    sound = write_wave(tmp_path / "talk.wav", [0] * 800, 8000)
     run("play", talk)
     assert window.options["audio"] == sound
     run("play", talk, "--audio-offset", "-0.25")
     assert (window.options["audio"], window.options["audio_offset"]) == (sound, -0.25)
     run("play", talk, "--no-audio")
     assert window.options["audio"] is None
-    other = write_wav(tmp_path / "other.wav")
+    other = write_wave(tmp_path / "other.wav", [0] * 800, 8000)
     run("play", talk, "--audio", other)
     assert window.options["audio"] == other
 
@@ -113,7 +104,7 @@ def test_broken_sound(run: Run, window: Window, talk: Path, tmp_path: Path) -> N
 def test_dropped_files_are_played_next(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.fba"
     other.write_bytes(talk.read_bytes())
-    write_wav(tmp_path / "other.wav")
+    write_wave(tmp_path / "other.wav", [0] * 800, 8000)
     window.dropped = [(other,), (talk, other)]
     run("play", talk, "--start", "1.2", "--paused", "--speed", "2")
     assert window.titles == ["talk.fba", "other.fba", "talk.fba | other.fba"]
@@ -149,8 +140,7 @@ def test_comparing(run: Run, window: Window, talk: Path, tmp_path: Path, face: A
     assert (window.scene.arrangement, window.options["panels"]) == ("over", ("differences",))
     assert {one.number for one in window.scene.differences().largest()} <= {3, 48}
     run("play", talk, talk, "--compare", "--arrange", "side")
-    assert window.scene.arrangement == "side"
-    assert window.scene.differences().largest() == []
+    assert (window.scene.arrangement, window.scene.differences().largest()) == ("side", [])
 
 
 @pytest.mark.parametrize(
@@ -173,7 +163,9 @@ def test_contradictory_options_are_refused(
 
 
 def test_sound_and_no_sound_contradict(run: Run, window: Window, talk: Path, tmp_path: Path) -> None:
-    refused = run("play", talk, "--audio", write_wav(tmp_path / "a.wav"), "--no-audio", code=2)
+    refused = run(
+        "play", talk, "--audio", write_wave(tmp_path / "a.wav", [0] * 800, 8000), "--no-audio", code=2
+    )
     assert "contradict" in refused.err
 
 
@@ -264,47 +256,37 @@ def test_a_body_from_a_file(run: Run, window: Window, tmp_path: Path, talk: Path
     assert "body.glb" in run("play", talk, "--body", tmp_path / "body.glb", code=1).err
 
 
-@pytest.fixture
-def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, dict[str, Any]]]:
-    """What windows were to show, and how."""
-    found: list[tuple[Any, dict[str, Any]]] = []
-    monkeypatch.setattr(player, "check_display", lambda: None)
-    monkeypatch.setattr(player.Surface, "open", lambda *_: None)
-    monkeypatch.setattr(player, "play", lambda build, **options: found.append((build(), options)))
-    return found
-
-
-def test_a_face_alone(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
+def test_a_face_alone(run: Run, window: Window, tmp_path: Path) -> None:
     FaceModel.default().save(tmp_path / "mine.glb")
     run("play", "--model", tmp_path / "mine.glb", "--size", "640x480")
-    scene, options = opened[0]
+    scene, options = window.scene, window.options
     assert not scene.has_body
     assert not np.any(scene.timeline.faps(0.0))
     assert (options["panels"], options["paused"], options["size"]) == (("puppet",), True, (640, 480))
     assert options["title"] == "mine.glb"
 
 
-def test_a_body_with_a_face(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
+def test_a_body_with_a_face(run: Run, window: Window, tmp_path: Path) -> None:
     BodyModel.default().save(tmp_path / "body.glb")
     run("play", "--body", tmp_path / "body.glb", "--show", "grid")
-    scene, _ = opened[0]
+    scene = window.scene
     assert scene.has_body
     assert scene.switches["grid"]
     assert scene.view_for(scene.timeline.faps(0.0), scene.timeline.baps(0.0)).faces
 
 
-def test_without_anything_the_built_in_person(run: Run, opened: list[tuple[Any, dict[str, Any]]]) -> None:
+def test_without_anything_the_built_in_person(run: Run, window: Window) -> None:
     run("play")
-    scene, options = opened[0]
+    scene, options = window.scene, window.options
     assert scene.has_body
     assert (options["panels"], options["title"]) == (("puppet",), "puppet")
 
 
-def test_options_that_need_a_file(run: Run, opened: list[tuple[Any, dict[str, Any]]], tmp_path: Path) -> None:
+def test_options_that_need_a_file(run: Run, window: Window, tmp_path: Path) -> None:
     (tmp_path / "mine.glb").write_bytes(b"")
     for words, said in (
         (("--compare", "--model", tmp_path / "mine.glb"), "--compare needs two files"),
         (("--model", tmp_path / "mine.glb", "--audio", tmp_path / "mine.glb"), "--audio goes with a file"),
     ):
         assert said in run("play", *words, code=2).err
-    assert not opened
+    assert window.scene is None

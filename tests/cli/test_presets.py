@@ -12,7 +12,7 @@ from command_line import Run
 from fba import Animation, BodyTrack, FaceTrack
 from fba.codec import quantise
 from fba.face import resolve
-from fba.face.interpolation._terms import Function, Link, Term
+from fba.face.interpolation._node import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.planning import hold_still
 

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-import wave
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from command_line import Run
 from fba import Animation
 from fba.body import gait
 from fba.cli.pose_options import Pose, still_animation
+from sound_clicks import write_wave
 from started_programs import started
 
 FACE = ("--fap", "open_jaw=200", "--size", "64x48", "--camera", "front")
@@ -194,10 +194,7 @@ def clip(tmp_path: Path, face: Animation) -> Path:
 
 
 def write_tone(path: Path, seconds: float) -> None:
-    samples = np.rint(9000 * np.sin(np.arange(round(seconds * 16000)) / 5)).astype("<i2")
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, 16000, 0, "NONE", ""))
-        file.writeframes(samples.tobytes())
+    write_wave(path, np.rint(9000 * np.sin(np.arange(round(seconds * 16000)) / 5)))
 
 
 def streams(path: Path) -> tuple[int, int]:
@@ -236,9 +233,7 @@ def test_the_sound_begins_later_or_earlier(run: Run, clip: Path, tmp_path: Path,
     av = pytest.importorskip("av")
     silence = np.zeros(16000, "<i2")
     silence[1600:1632] = 30000  # a click at 0.1 s
-    with wave.open(str(clip.with_suffix(".wav")), "wb") as file:
-        file.setparams((1, 2, 16000, 0, "NONE", ""))
-        file.writeframes(silence.tobytes())
+    write_wave(clip.with_suffix(".wav"), silence)
     path = tmp_path / "film.mp4"
     run("render", clip, "-o", path, "--audio-offset", str(offset), *SMALL)
     with av.open(str(path)) as film:
@@ -267,8 +262,7 @@ def test_numbered_pictures_and_gifs(run: Run, clip: Path, tmp_path: Path) -> Non
     assert run(*arguments) == (0, f"{folder}: 96x72\n", "")
     assert sorted(path.name for path in folder.iterdir()) == [f"{number:05d}.png" for number in range(6)]
     with Image.open(folder / "00000.png") as picture:
-        assert picture.mode == "RGBA"
-        assert picture.getextrema()[3] == (0, 255)
+        assert (picture.mode, picture.getextrema()[3]) == ("RGBA", (0, 255))
     assert "00000.png to 00005.png (6 pictures) are in this folder already" in run(*arguments, code=1).err
     run(*arguments, "--replace")
     gif = tmp_path / "a.gif"
@@ -489,6 +483,4 @@ def test_a_transparent_background_is_in_the_file(run: Run, tmp_path: Path) -> No
     path = tmp_path / "clear.png"
     run("render", *FACE, "--show", "background=transparent", "-o", path)
     pixels = np.asarray(Image.open(path))
-    assert pixels.shape == (48, 64, 4)
-    assert pixels[2, 2, 3] == 0
-    assert pixels[24, 32, 3] == 255
+    assert (pixels.shape, pixels[2, 2, 3], pixels[24, 32, 3]) == ((48, 64, 4), 0, 255)

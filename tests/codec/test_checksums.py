@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fba
+from codec_streams import flipped
 from fba import Animation, BitstreamError, Decoder, EncoderOptions, FbaError, FbaWarning
 from fba.codec import Damage, Encoder, probe_stream, verify_stream, write_mark
 from fba_conformance.trace import planes as read_planes
@@ -36,12 +37,6 @@ def stream(options: EncoderOptions) -> bytes:
 
 def bare(options: EncoderOptions) -> bytes:
     return stream(EncoderOptions(**{**options.__dict__, "mark": False}))
-
-
-def flipped(data: bytes, bit: int) -> bytes:
-    changed = bytearray(data)
-    changed[bit >> 3] ^= 128 >> (bit & 7)
-    return bytes(changed)
 
 
 def written(crc: int) -> bytes:
@@ -75,8 +70,7 @@ def test_every_flipped_bit_is_noticed() -> None:
             steps = None if complete else "visage"
             true, unsaid = fba.decode(data, bap_steps=steps), 0
             for bit in range(0, 8 * len(data), 5):
-                with warnings.catch_warnings(record=True) as said:
-                    warnings.simplefilter("always")
+                with warnings.catch_warnings(record=True, action="always") as said:
                     try:
                         found = fba.decode(flipped(data, bit), bap_steps=steps)
                     except FbaError:
@@ -95,8 +89,7 @@ def silent_flip(options: EncoderOptions, period: int) -> tuple[bytes, range]:
     for bit in range(int(ends[PERIOD * period]) + 40, int(ends[PERIOD * period + PERIOD - 2])):
         changed = flipped(plain, bit)
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
+            with warnings.catch_warnings(action="error"):
                 found = fba.decode(changed, bap_steps="visage")
         except (FbaError, FbaWarning):
             continue
@@ -191,8 +184,7 @@ def test_undamaged_streams_match_their_checks() -> None:
     from tools.look_ahead import random_animation
 
     random = Random(8)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         warnings.filterwarnings("ignore", message=".*(limited to what|time code|starts at).*")
         for _ in range(60):
             options = EncoderOptions(**{**random_options(random).__dict__, "mark": True})
@@ -212,8 +204,7 @@ def test_doubtful_marks_do_not_hide_what_can_be_decoded(name: str, size: int) ->
     """However wrong the mark, every plane is returned, and something is said."""
     data = doubtful_marks()[name]
     decoder = Decoder(on_error="salvage")
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as said:
         frames = [f for start in range(0, len(data), size) for f in decoder.push(data[start : start + size])]
         frames += decoder.finish()
     assert len(frames) == 5
@@ -269,8 +260,7 @@ def test_a_plane_behind_the_end_of_a_damaged_stream_is_reported_once() -> None:
 def test_an_end_code_before_the_damage_does_not_end_it(data: str) -> None:
     """Found by fuzzing: what was lost was listed twice, and out of order."""
     decoder = Decoder(on_error="salvage")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         decoder.push(bytes.fromhex(data))
         decoder.finish()
     borders = [(damage.start, damage.stop) for damage in decoder.damage]

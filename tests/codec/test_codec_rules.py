@@ -51,8 +51,7 @@ def test_a_stream_without_a_rate_has_25_frames_a_second() -> None:
 
 def test_a_stream_may_begin_with_its_time_code() -> None:
     clock = StreamClock()
-    assert clock.begin_intra(FrameRate(25), TimeCode(0, 0, 0)) == []
-    assert clock.index == 0
+    assert (clock.begin_intra(FrameRate(25), TimeCode(0, 0, 0)), clock.index) == ([], 0)
 
 
 def test_a_new_rate_begins_at_the_next_whole_frame() -> None:
@@ -63,8 +62,7 @@ def test_a_new_rate_begins_at_the_next_whole_frame() -> None:
 
 def test_a_time_code_of_the_present_moment_changes_nothing() -> None:
     clock = clock_after(25, FrameRate(25))
-    assert clock.begin_intra(None, TimeCode(0, 0, 1)) == []
-    assert clock.index == 25
+    assert (clock.begin_intra(None, TimeCode(0, 0, 1)), clock.index) == ([], 25)
 
 
 @pytest.mark.parametrize(("rate", "index"), [(FrameRate(30, 0, 1), 30), (FrameRate(12, 8), 13)])
@@ -92,8 +90,7 @@ def test_a_time_code_without_its_marker_is_not_used() -> None:
 def test_skipped_frames_count() -> None:
     clock = StreamClock()
     clock.begin_intra(FrameRate(25), None)
-    assert clock.advance(np.array([0, 2, 0])).tolist() == [0, 1, 4]
-    assert clock.index == 5
+    assert (clock.advance(np.array([0, 2, 0])).tolist(), clock.index) == ([0, 1, 4], 5)
 
 
 # --- one rate for a whole stream ----------------------------------------------------------------------
@@ -103,8 +100,7 @@ def test_two_rates_have_the_lowest_common_one() -> None:
     base = TimeBase(in_place=False)
     base.add(np.array([0]), Fraction(0), NTSC)
     base.add(np.array([2]), 1 / NTSC, Fraction(25))
-    assert base.rate == 30000
-    assert base.index().tolist() == [0, 1001]
+    assert (base.rate, base.index().tolist()) == (30000, [0, 1001])
 
 
 def test_rates_without_a_common_one_below_a_million_take_the_highest_and_round() -> None:

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from codec_streams import END, OBJECT, content, decoded
+from codec_streams import END, OBJECT, content, decoded, flipped
 from fba import (
     Animation,
     BitstreamError,
@@ -63,8 +63,7 @@ def is_good(frame: Frame, same: Frame) -> bool:
 
 
 def checked_animation(data: bytes, mode: str) -> Animation | FbaError:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         try:
             animation = decode(data, on_error=mode)  # type: ignore[arg-type]
         except (BitstreamError, UnsupportedError) as error:
@@ -105,21 +104,20 @@ def test_every_bit_flipped(name: str) -> None:
     data, frames = stream(name), truth(name)
     codes = [at for at in start_codes(data) if data[at + 3] in {0xBB, 0xB1}]
     for bit in range(8 * len(data)):
-        bad = bytearray(data)
-        bad[bit >> 3] ^= 128 >> (bit & 7)
+        bad = flipped(data, bit)
         before = [f for f in frames if f.plane.bit + f.plane.bits <= bit]
-        got, error, _ = decoded(bytes(bad))
+        got, error, _ = decoded(bad)
         assert error is None or isinstance(error, (BitstreamError, UnsupportedError))
         assert len(got) >= len(before) - (bit >= 8 * len(data) - 32)
         assert all(is_good(*pair) for pair in zip(got, before, strict=False))
-        salvaged, fatal, decoder = decoded(bytes(bad), mode="salvage")
+        salvaged, fatal, decoder = decoded(bad, mode="salvage")
         assert fatal is None or not salvaged
         assert len(salvaged) >= len(got)
         assert all(is_good(*pair) for pair in zip(salvaged, before, strict=False))
         at = 0
         for damage in decoder.damage:
             assert at <= damage.start <= damage.stop <= len(data)
-            assert damage.stop == len(data) or bytes(bad[damage.stop : damage.stop + 3]) == b"\0\0\1"
+            assert damage.stop == len(data) or bad[damage.stop : damage.stop + 3] == b"\0\0\1"
             at = damage.stop
         if error is not None:
             assert decoder.damage
@@ -262,15 +260,13 @@ def test_what_ends_an_object_before_another(between: bytes, warned: str) -> None
     """Headers of the next object do so in order; another start code is told."""
     data, frames = stream("body"), truth("body")
     assert data.endswith(END)
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as told:
         animation = decode(data[:-4] + between + data)
     assert len(animation) == 2 * len(frames)
     assert [f"start code 00 00 01 {warned} where" in str(one.message) for one in told] == [True] * bool(
         warned
     )
-    with warnings.catch_warnings(record=True) as lost:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as lost:
         assert decode(data[:-4] + between + data, on_error="salvage") == animation
     assert len(lost) == len(told)
 

@@ -265,10 +265,8 @@ def test_no_planes(data: bytes) -> None:
         decode(data)
     with pytest.raises(BitstreamError):
         probe_stream(data)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
-        with pytest.raises(BitstreamError):
-            decode(data, on_error="salvage")
+    with warnings.catch_warnings(action="ignore", category=FbaWarning), pytest.raises(BitstreamError):
+        decode(data, on_error="salvage")
 
 
 def test_values_that_grow_without_end() -> None:

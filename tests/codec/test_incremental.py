@@ -143,8 +143,7 @@ def test_errors_come_after_the_frames_before_them() -> None:
 def test_finish_twice_and_push_after_it() -> None:
     decoder = Decoder()
     decoder.push(stream("both"))
-    assert decoder.finish() == []
-    assert decoder.finish() == []
+    assert (decoder.finish(), decoder.finish()) == ([], [])
     with pytest.raises(ValueError, match="this decoder is finished"):
         decoder.push(b"\0")
 

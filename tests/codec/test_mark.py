@@ -56,8 +56,7 @@ def test_faces_and_unquantised_bodies_need_no_mark() -> None:
 
 def test_decoders_use_the_table_of_the_mark() -> None:
     data = stream()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         assert shoulder(fba.decode(data)) == RIGHT
         assert fba.decode(data) == fba.decode(stream(mark=False), bap_steps="visage")
         assert probe_stream(data).bap_steps == "visage"
@@ -84,8 +83,7 @@ def test_joined_streams_each_use_their_mark() -> None:
 def test_a_mark_applies_only_to_the_object_before_it() -> None:
     """The second object has user data, but no mark: it is not "visage", as the first."""
     data = stream() + stream(mark=False) + b"\0\0\1\xb2somebody's words"
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         found = fba.decode(data)
     assert shoulder(found) == RIGHT + shoulder(fba.decode(stream(mark=False)))
     assert probe_stream(data).bap_steps is None
@@ -94,16 +92,14 @@ def test_a_mark_applies_only_to_the_object_before_it() -> None:
 @pytest.mark.parametrize("size", [1, 7, 100])
 def test_a_decoder_with_the_wrong_table_warns_at_the_end(size: int) -> None:
     data, decoder = stream(), Decoder()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         frames = [f for start in range(0, len(data), size) for f in decoder.push(data[start : start + size])]
         frames += decoder.finish()
     said = "the stream says behind its end that it was made with the BAP steps 'visage'; "
     assert [str(one.message) for one in caught] == [said + "it was decoded with 'iso'"]
     assert (len(frames), decoder.mark, decoder.ended, decoder.damage) == (6, "visage", True, [])
     told = Decoder(bap_steps="visage")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         told.push(data)
         told.finish()
     assert told.mark == "visage"
@@ -141,8 +137,7 @@ def test_an_unknown_table_is_named() -> None:
 
 def test_other_user_data_are_not_a_mark() -> None:
     plain = stream(mark=False)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         assert fba.decode(plain + b"\0\0\1\xb2somebody's words") == fba.decode(plain)
     with pytest.warns(FbaWarning, match="bytes follow the end"):
         assert fba.decode(plain + b"?" + MARK) == fba.decode(plain)
@@ -160,8 +155,7 @@ OPENING = bytes.fromhex("000001b064000001b2") + b"fba bap_steps=visage;" + bytes
 @pytest.mark.parametrize("size", [1, 3, 7, 1000])
 def test_a_mark_before_the_object_counts_from_the_first_plane_on(size: int) -> None:
     assert write_opening("visage") == OPENING
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         for behind in (b"", MARK):
             data = OPENING + stream(mark=False) + behind
             assert fed(data, size)[0] == RIGHT
@@ -176,8 +170,7 @@ def test_a_mark_before_the_object_counts_from_the_first_plane_on(size: int) -> N
 def test_streams_in_a_pipe_use_the_table_before_them() -> None:
     other = write_opening("iso") + stream("iso", mark=False)
     iso = shoulder(fba.decode(stream("iso", mark=False)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         assert fed(OPENING + stream() + other + OPENING + stream(), 5)[0] == RIGHT + iso + RIGHT
 
 
@@ -193,8 +186,7 @@ def test_streams_in_a_pipe_use_the_table_before_them() -> None:
 )  # fmt: skip
 def test_contradictory_or_damaged_marks_give_warnings(data: bytes, said: str) -> None:
     for read in (lambda: fed(data, 1), lambda: fed(data, 50), lambda: fba.decode(data)):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as caught:
             read()
         assert any(said in str(one.message) for one in caught)
 

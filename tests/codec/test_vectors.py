@@ -96,8 +96,7 @@ def test_old_plane_start_code() -> None:
 @pytest.mark.parametrize("name", REAL)
 def test_planes_as_another_decoder_traced_them(name: str) -> None:
     """Per plane: parts, time, rate, skip, quantisers, gender, coding type, range flags, position and bits."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         frames = planes(name)
     lines = (SHARED / "vectors" / name).with_suffix(".trace").read_text(encoding="ascii").splitlines()
     assert len(lines) == len(frames)

@@ -1,20 +1,19 @@
 """The trace of streams made by hand, bit by bit from the syntax tables."""
 
 import json
-from collections.abc import Sequence
 from fractions import Fraction
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from codec_streams import FAP_GROUP_SIZES, fap_masks, flipped, segment
 from fba import BitstreamError, FbaError, FbaWarning, UnsupportedError
 from fba_conformance._textbook import FrequencyTable, encode_segment
 from fba_conformance.trace import Element, Levels, decode_values, element_dict, format_trace, trace
 
 OBJECT, PLANE, END = (f"{code:032b}" for code in (0x1BA, 0x1BB, 0x1B1))
 OLD_OBJECT, OLD_PLANE = (f"{code:032b}" for code in (0x101, 0x103))
-FAP_GROUP_SIZES = (2, 16, 12, 8, 4, 5, 3, 10, 4, 4)
 NO_BAPS = "1" + "00"
 I_FAPS, P_FAPS, I_BAPS, P_BAPS = "1" + "01", "0" + "01", "1" + "10", "0" + "10"
 NO_RATE, NO_TIME, NO_SKIP = "0", "0", "0"
@@ -32,32 +31,13 @@ def as_bytes(bits: str) -> bytes:
     return int("1" + bits, 2).to_bytes(len(bits) // 8 + 1, "big")[1:]
 
 
-def fap_masks(*sent: int, mask_type: int = 1) -> str:
-    """Masks of the 10 groups: type 0 where nothing is sent."""
-    bits, first = "", 1
-    for size in FAP_GROUP_SIZES:
-        flags = "".join("1" if first + i in sent else "0" for i in range(size))
-        bits += "1" + (f"{mask_type:02b}{flags}" if "1" in flags else "00")
-        first += size
-    return bits
-
-
-def coded(levels: Sequence[int], limits: Sequence[tuple[int, int]]) -> str:
-    """A segment of an I plane."""
-    return encode_segment(
-        [level - low for level, (low, _) in zip(levels, limits, strict=True)],
-        [FrequencyTable(high - low + 1) for low, high in limits],
-        learn=False,
-    )
-
-
 def intra(quant: int, masks: str, *segments: str, time: str = NO_RATE + NO_TIME + NO_SKIP) -> str:
     return I_FAPS + time + f"{quant:05b}" + masks + GENDER_CODING + NO_LISTS + "".join(segments)
 
 
 JAW = fap_masks(3)
 JAW_LIMITS = [(-1080, 1080)]
-JAW_PLANE = intra(1, JAW, coded([5], JAW_LIMITS))
+JAW_PLANE = intra(1, JAW, segment([5], JAW_LIMITS))
 
 
 def one_object(*planes: str) -> bytes:
@@ -107,12 +87,12 @@ def test_every_element_of_an_intra_plane() -> None:
                 parts.append((f"{name} {label}", f"{code:05b}"))
     # Blends and intensities to (63 + 3 // 2) // 3 = 21, ranges 420 // 3 and 60 // 3.
     parts += [
-        ("viseme segment", coded([14, 2, 21], [(0, 14), (0, 14), (0, 21)])),
+        ("viseme segment", segment([14, 2, 21], [(0, 14), (0, 14), (0, 21)])),
         ("viseme_def", "1"),
-        ("expression segment", coded([6, 20, 1, 0], [(0, 6), (0, 21), (0, 6), (0, 21)])),
+        ("expression segment", segment([6, 20, 1, 0], [(0, 6), (0, 21), (0, 6), (0, 21)])),
         ("init_face", "0"),
         ("expression_def", "1"),
-        ("faps segment", coded([-20, 140], [(-20, 140)] * 2)),
+        ("faps segment", segment([-20, 140], [(-20, 140)] * 2)),
     ]
     written = "".join(bits for _, bits in parts)
     stuffing = stuffed(written)[len(written) :]
@@ -131,12 +111,10 @@ def test_every_element_of_an_intra_plane() -> None:
 
     (plane,) = decode_values(data)
     assert plane["fap"] == {3: -20 * 4 * 3, 61: 140 * 1 * 3}
-    assert plane["viseme"] == [14, 2, 63, 1]
-    assert plane["expression"] == [6, 60, 1, 0, 0, 1]
+    assert (plane["viseme"], plane["expression"]) == ([14, 2, 63, 1], [6, 60, 1, 0, 0, 1])
     assert plane["rate"] == Fraction(479_000, 16_016)  # 29 15/16, times 1000/1001
     assert plane["time"] == (23 * 60 + 59) * 60 + 58
-    assert plane["skip"] == 17
-    assert plane["frame_rate"] == (29, 15, 1)
+    assert (plane["skip"], plane["frame_rate"]) == (17, (29, 15, 1))
     assert plane["fap_mask_types"] == (3, 1, 0, 0, 0, 0, 0, 0, 2, 0)
 
 
@@ -154,7 +132,7 @@ def test_default_ranges_of_faps(number: int, quant: int, intra_limit: int, p_lim
     table = FrequencyTable(2 * p_limit + 1)
     moves = [-p_limit, 3]
     predicted = [P_FAPS + NO_SKIP + encode_segment([move + p_limit], [table], learn=True) for move in moves]
-    first = intra(quant, fap_masks(number), coded([intra_limit], [(-intra_limit, intra_limit)]))
+    first = intra(quant, fap_masks(number), segment([intra_limit], [(-intra_limit, intra_limit)]))
     planes = decode_values(one_object(first, *predicted))
     levels = [intra_limit, intra_limit - p_limit, intra_limit - p_limit + 3]
     assert [p["fap"] for p in planes] == [{number: level * step} for level in levels]
@@ -168,7 +146,7 @@ def test_baps_go_by_their_table_and_their_own_order() -> None:
     """Group 1: sacroiliac, steps 64 (iso) and 170 (visage); bap_quant 4 scales by 5; limits -960..960."""
     plane = (
         I_BAPS + NO_RATE + NO_TIME + NO_SKIP + f"{4:05b}" + bap_masks(1, "101") + GENDER_CODING + NO_LISTS
-        + coded([192, -192], [(-192, 192)] * 2)
+        + segment([192, -192], [(-192, 192)] * 2)
     )  # fmt: skip
     data = one_object(plane)
     assert decode_values(data)[0]["bap"] == {1: 192 * 64 * 5, 3: -192 * 64 * 5}
@@ -178,15 +156,17 @@ def test_baps_go_by_their_table_and_their_own_order() -> None:
 def test_extension_baps_need_their_ranges() -> None:
     start = I_BAPS + NO_RATE + NO_TIME + NO_SKIP + f"{1:05b}" + bap_masks(20, "1" + "0" * 21) + GENDER_CODING
     with pytest.raises(BitstreamError, match=r"BAP 187 .*range was never sent"):
-        decode_values(one_object(start + NO_LISTS + coded([0], [(-60, 60)])))
+        decode_values(one_object(start + NO_LISTS + segment([0], [(-60, 60)])))
 
 
 def test_ranges_persist_and_are_divided_by_the_new_quantiser() -> None:
     """List i_max alone in plane 0; plane 1 has no list, quantiser 7: 1860 // 7, and -1080 // 7 toward 0."""
     i_max = "".join("1" * (position % 4 == 0) + "11111" * (number == 3) for number, position in FAP_POSITIONS)
     time = NO_RATE + NO_TIME + NO_SKIP
-    first = I_FAPS + time + f"{1:05b}" + JAW + GENDER_CODING + "1000" + i_max + coded([1860], [(-1080, 1860)])
-    second = intra(7, JAW, coded([-154], [(-154, 265)]))
+    first = (
+        I_FAPS + time + f"{1:05b}" + JAW + GENDER_CODING + "1000" + i_max + segment([1860], [(-1080, 1860)])
+    )
+    second = intra(7, JAW, segment([-154], [(-154, 265)]))
     planes = decode_values(one_object(first, second))
     assert [p["fap"][3] for p in planes] == [1860 * 4, -154 * 4 * 7]
     assert [p["fap_lists"] for p in planes] == ["1000", "0000"]
@@ -201,10 +181,10 @@ def test_time_runs_on_over_skips_rates_and_time_codes() -> None:
     code = "1" + f"{1:05b}{2:06b}" + "1" + f"{3:06b}"
     planes = decode_values(
         one_object(
-            intra(1, JAW, coded([5], JAW_LIMITS), time=rate_10 + NO_TIME + "1" + "0100"),  # 4 skipped
+            intra(1, JAW, segment([5], JAW_LIMITS), time=rate_10 + NO_TIME + "1" + "0100"),  # 4 skipped
             p_plane,
-            intra(1, JAW, coded([5], JAW_LIMITS), time=NO_RATE + code + NO_SKIP),
-            intra(1, JAW, coded([5], JAW_LIMITS)),
+            intra(1, JAW, segment([5], JAW_LIMITS), time=NO_RATE + code + NO_SKIP),
+            intra(1, JAW, segment([5], JAW_LIMITS)),
         )
     )
     hour = 3723
@@ -215,7 +195,7 @@ def test_time_runs_on_over_skips_rates_and_time_codes() -> None:
 def test_time_code_with_marker_0_is_read_with_a_warning() -> None:
     time = NO_RATE + "1" + f"{1:05b}{2:06b}" + "0" + f"{3:06b}" + NO_SKIP
     with pytest.warns(FbaWarning, match="plane 0, bit 48: the marker bit of the time code is 0"):
-        (plane,) = decode_values(one_object(intra(1, JAW, coded([5], JAW_LIMITS), time=time)))
+        (plane,) = decode_values(one_object(intra(1, JAW, segment([5], JAW_LIMITS), time=time)))
     assert plane["time_code"] == (1, 2, 0, 3)
 
 
@@ -239,7 +219,7 @@ def test_plane_behind_a_start_code_may_look_like_another() -> None:
     """P plane, FAPs and BAPs, skip 15: 0 11 1 1111 is 0x7F; then 0000 and 19 zeros of levels, and a 1."""
     both = "1" + "11" + NO_RATE + NO_TIME + NO_SKIP
     no_baps = f"{1:05b}" + NO_BAPS * 24 + GENDER_CODING + NO_LISTS + "01"
-    levels = coded([0, 0], [(-1080, 1080), (-600, 600)])
+    levels = segment([0, 0], [(-1080, 1080), (-600, 600)])
     first = both + f"{1:05b}" + fap_masks(3, 4) + GENDER_CODING + NO_LISTS + levels + no_baps
     highest = encode_segment([720, 360], [FrequencyTable(721), FrequencyTable(361)], learn=True)
     assert highest == "0" * 19 + "1"
@@ -268,7 +248,7 @@ UP_TO_QUANT = I_FAPS + NO_RATE + NO_TIME + NO_SKIP + "00001"
         (OBJECT + I_BAPS + "000" + "00001" + "110" + "0" * 40, 0, 44, "bap_mask_type of group 1 is 2"),
         (OBJECT + UP_TO_QUANT + "10010", 0, 47, "fap_mask_type: needs 2 bits, but the data ends after 1"),
         (
-            OBJECT + intra(1, fap_masks(1), coded([9, 0, 0], [(0, 14), (0, 14), (0, 63)]), "0", "01")
+            OBJECT + intra(1, fap_masks(1), segment([9, 0, 0], [(0, 14), (0, 14), (0, 63)]), "0", "01")
             + P_FAPS + NO_SKIP
             + encode_segment([28, 14, 63], [FrequencyTable(n) for n in (29, 29, 127)], learn=True) + "0" * 9,
             1, None, "viseme_select1 becomes 23, expected 0..14",
@@ -332,11 +312,11 @@ RICH = one_object(
     intra(
         2,
         fap_masks(1, 2, 3, 48, 49),
-        coded([1, 2, 9], [(0, 14), (0, 14), (0, 32)]) + "0",
-        coded([1, 2, 3, 4], [(0, 6), (0, 32), (0, 6), (0, 32)]) + "00",
-        coded([5, -6, 7], [(-540, 540), (-930, 930), (-930, 930)]),
+        segment([1, 2, 9], [(0, 14), (0, 14), (0, 32)]) + "0",
+        segment([1, 2, 3, 4], [(0, 6), (0, 32), (0, 6), (0, 32)]) + "00",
+        segment([5, -6, 7], [(-540, 540), (-930, 930), (-930, 930)]),
     ),
-    intra(1, JAW, coded([5], JAW_LIMITS)),
+    intra(1, JAW, segment([5], JAW_LIMITS)),
 )
 
 
@@ -346,9 +326,7 @@ def test_rich_stream_is_good_and_survives_cuts_and_flips() -> None:
     for length in range(len(RICH)):
         check_hostile(RICH[:length])
     for bit in range(len(RICH) * 8):
-        flipped = bytearray(RICH)
-        flipped[bit // 8] ^= 128 >> bit % 8
-        check_hostile(bytes(flipped))
+        check_hostile(flipped(RICH, bit))
 
 
 @pytest.mark.filterwarnings("ignore::fba.FbaWarning")

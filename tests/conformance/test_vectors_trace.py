@@ -26,8 +26,7 @@ pytestmark = pytest.mark.slow
 @cache
 def traced(path: Path, bap_steps: str) -> tuple[list[dict[str, Any]], list[type[Warning]]]:
     """Planes of a stream, and the categories of the warnings that it gives."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         planes = decode_values(path.read_bytes(), bap_steps=bap_steps)
     return planes, [warning.category for warning in caught]
 

@@ -74,11 +74,8 @@ def test_who_is_ashamed_or_guilty_looks_away() -> None:
 
 def test_whissels_table() -> None:
     points = emotion.known_points()
-    assert points["fear"] == (4.9, 3.4)
-    assert points["shame"] == (2, 2.7)
-    assert points["guilt"] == (4, 1.1)
-    assert points["delight"] == (4.2, 6.4)
-    assert len(points) == 11
+    assert (points["fear"], points["shame"], points["guilt"]) == ((4.9, 3.4), (2, 2.7), (4, 1.1))
+    assert (points["delight"], len(points)) == ((4.2, 6.4), 11)
 
 
 @pytest.mark.parametrize("name", ["Afraid", "fear", " FEAR ", "scared"])

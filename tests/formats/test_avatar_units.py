@@ -41,8 +41,7 @@ def test_units_of_others_are_read(tmp_path: Path) -> None:
     with pytest.warns(FbaWarning, match="ARKit's order|of type 3, 1 of type 77|shapes") as said:
         animation = fba.read(path)
     assert "1 of type 3, 1 of type 77" in str(said[0].message)
-    assert animation.rate == 30
-    assert len(animation) == 6
+    assert (animation.rate, len(animation)) == (30, 6)
     assert (np.diff(animation.face.values[:, fap_numbers()["open_jaw"] - 1]) > 0).all()
 
 
@@ -122,8 +121,7 @@ def test_joints_of_further_trees_are_left_out(tmp_path: Path) -> None:
         stream = configuration("arf-body-v1") + b"".join(joints(frame, placed) for frame in range(3))
         archive.writestr("animations/joints.bin", stream)
     motion = read_motion(path)
-    assert motion.names == ("hips", "knee", "ankle")
-    assert motion.parents.tolist() == [-1, 0, 1]
+    assert (motion.names, motion.parents.tolist()) == (("hips", "knee", "ankle"), [-1, 0, 1])
     assert motion.world()[1][2, :, 1] == pytest.approx([1.0, 0.6, 0.3], abs=1e-6)
 
 

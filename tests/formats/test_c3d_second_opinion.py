@@ -26,8 +26,7 @@ def by_ezc3d(path: Path) -> tuple[list[str], np.ndarray]:
 def by_c3d(path: Path) -> tuple[list[str], np.ndarray]:
     """The same as another library reads it."""
     c3d = pytest.importorskip("c3d", reason="c3d is not installed: pip install c3d")
-    with path.open("rb") as file, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with path.open("rb") as file, warnings.catch_warnings(action="ignore"):
         reader = c3d.Reader(file)
         frames = np.array([points[:, :4] for _, points, _ in reader.read_frames(copy=True)], dtype=np.float64)
         labels = [label.strip() for label in reader.point_labels]

@@ -1,22 +1,27 @@
-"""Numbers that no honest file has: refused with their place, never another exception."""
+"""Cut and arbitrary texts, and numbers that no honest file has: refused with their place, or a result."""
 
 import json
-import struct
-import wave
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
 
 import fba
-from fba.errors import FbaError, FormatError, LimitError, ModelError
+from fba.errors import FbaError, FbaWarning, FormatError, LimitError, ModelError
 from fba.face.importers.points.points_file import read_points
+from fba.formats import read
 from fba.formats.bvh._reader import read_motion
 from fba.formats.c3d._reader import read_markers
 from fba.formats.face_tables._points_arrays import read_points as read_film
+from fba.formats.text.fap import read_fap, write_fap
 from fba.mesh._ply import read_ply
 from fba.mesh._vrml import read_vrml
 from fba.mesh._wfm import read_wfm
+from format_files import mask
+from sound_clicks import write_wave
 
 CORPUS = Path(__file__).parents[1] / "fuzz/corpus"
 BVH = """HIERARCHY
@@ -118,12 +123,7 @@ def test_a_sound_of_a_rate_that_no_device_has(tmp_path: Path, rate: int) -> None
     pytest.importorskip("av")
     from fba.audio import SoundFile
 
-    path = tmp_path / "a.wav"
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(1)
-        file.setframerate(rate)
-        file.writeframes(bytes(1000))
+    path = write_wave(tmp_path / "a.wav", bytes(1000), rate, width=1)
     with pytest.raises(FormatError, match=f"claims {rate} samples a second; 1000 to 1000000 can be read"):
         SoundFile(path)
 
@@ -133,12 +133,7 @@ def test_more_channels_than_can_be_mixed(tmp_path: Path, channels: int) -> None:
     pytest.importorskip("av")
     from fba.audio import SoundFile
 
-    path = tmp_path / "a.wav"
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(channels)
-        file.setsampwidth(2)
-        file.setframerate(8000)
-        file.writeframes(struct.pack("<h", 1000) * channels * 100)
+    path = write_wave(tmp_path / "a.wav", [1000] * channels * 100, 8000, channels)
     with pytest.warns(UserWarning, match="left out"), pytest.raises(FormatError, match="no sound"):
         SoundFile(path).read(0, np.iinfo(np.int16).max)
 
@@ -162,3 +157,60 @@ def test_points_that_signal_are_not_seen(tmp_path: Path) -> None:
     points.ravel()[:1] = np.frombuffer(SIGNALS["<"], np.float32)
     np.save(tmp_path / "a.npy", points)
     assert np.isnan(read_film(tmp_path / "a.npy", source_rate=25).positions[0, 0]).all()
+
+
+WORDS = (
+    b"", b" ", b"\n", b"\r", b"#", b"0", b"1", b"-1", b"2", b"1e308", b"-1e999", b"inf", b"nan", b".5",
+    b"99999999999999999999",
+    b"\0", b"\xff", b"1" * 70_000, b"2.1 a 25 1\n", b"3.2", b"1/0",
+    b"29.97", b"FBM 3\n", b"ISI 0\n", b"FIX", b"x", b"+", b"\t", b"1 " * 68,
+)  # fmt: skip
+
+FAP = "\n".join(
+    [
+        "# c",
+        "2.1 a b 25 3",
+        mask(1, 2, 3, 50),
+        "0 1 2 3 1 1 2 3 4 1 0 77 -5",
+        mask(3),
+        "1 5.5",
+        mask(3, 68),
+        "3 5 6",
+        "",
+    ]
+).encode()
+
+
+def test_cut_at_every_byte(tmp_path: Path) -> None:
+    path = tmp_path / "a.fap"
+    frames = []
+    for end in range(1, len(FAP)):
+        path.write_bytes(FAP[:end])
+        with warnings.catch_warnings(action="error"):
+            warnings.simplefilter("ignore", FbaWarning)
+            try:
+                frames.append(len(read_fap(path, salvage=True)))
+            except FbaError:
+                assert not frames or frames[-1] == 0, "once there is a frame, salvage keeps it"
+    assert frames == sorted(frames)
+    assert frames[-1] == 3
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.binary(max_size=300)
+    | st.text(max_size=300).map(str.encode)
+    | st.lists(st.sampled_from(WORDS)).map(b" ".join)
+)
+@example(b"\xef\xbb\xbf")  # a byte order mark and nothing else
+def test_anything_at_all(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "a.fap"
+    path.write_bytes(data)
+    with warnings.catch_warnings(action="error"):
+        warnings.simplefilter("ignore", FbaWarning)
+        try:
+            animation = read(path, source_rate=25) if data[:4] not in (b"\0\0\1\xba", b"\0\0\1\1") else None
+            if animation is not None:
+                write_fap(tmp_path / "b.fap", animation)
+        except FbaError:
+            pass

@@ -160,8 +160,7 @@ def test_a_shoulder_is_found_by_where_it_hangs(tmp_path: Path, bones: bytes) -> 
     values = []
     for content in (bones, edited(bones, rename_shoulders)):
         path.write_bytes(content)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             body = fba.read(path, plant=False).body
         values.append(body.values)
     apart = np.abs(values[0] - values[1]).max(axis=0)

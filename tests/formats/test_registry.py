@@ -199,8 +199,7 @@ def test_probe_of_another_format(tmp_path: Path) -> None:
 
 def test_merge_joins_by_frame_number() -> None:
     joined = merge(performance(body=False, first=1), performance(face=False, first=2))
-    assert joined.index.tolist() == [1, 2, 3, 4]
-    assert joined.name == "face"
+    assert (joined.index.tolist(), joined.name) == ([1, 2, 3, 4], "face")
     assert joined.face.mask.any(axis=1).tolist() == [True, True, True, False]
     assert joined.body.mask.any(axis=1).tolist() == [False, True, True, True]
     assert joined.face.values[:, 5].tolist() == [30, 30, 30, 0]

@@ -41,8 +41,7 @@ def test_foreign_streams(shared: Path) -> None:
         checked += 1
         chosen = choose_steps(data).table
         if chosen != right:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", fba.FbaWarning)
+            with warnings.catch_warnings(action="ignore", category=fba.FbaWarning):
                 if fba.decode(data, bap_steps=chosen) != fba.decode(data, bap_steps=right):
                     wrong.add(record["stream"])
     assert (checked, wrong) == (70, UNTOLD)

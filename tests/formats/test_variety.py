@@ -140,8 +140,7 @@ def test_meshes(
     corners = [(0.0, 0.0, 0.0), (12.5, -1.0, 0.001), (1.0, dice.choice(VALUES), 3.0)]
     path = tmp_path / f"a.{suffix}"
     path.write_bytes(make(dice, corners).encode())
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         found = read(path)
     np.testing.assert_allclose(found.vertices, corners, rtol=1e-6)  # type: ignore[attr-defined]
     assert found.corners.tolist() == [0, 1, 2]  # type: ignore[attr-defined]

@@ -145,7 +145,7 @@ READING = {
         "fba.formats.face_tables._shapes_json", "fba.formats.face_tables._points_arrays",
         "fba.formats.face_tables._points_csv", "fba.formats.face_tables._points_json",
     ),
-    "smpl": ("fba.formats.smpl._reader", "fba.formats.numpy_archives"),
+    "smpl": ("fba.formats.smpl._reader", "fba.formats.zip_files"),
     "arf": (
         "fba.carriage.avatar_units", "fba.formats.avatar._reader", "fba.formats.avatar._container",
     ),

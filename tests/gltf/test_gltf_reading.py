@@ -30,13 +30,9 @@ def test_a_triangle(tmp_path: Path) -> None:
     assert primitive.triangles.tolist() == [[0, 1, 2]]
     assert not primitive.positions.flags.writeable
     assert not primitive.triangles.flags.writeable
-    assert (primitive.normals, primitive.texcoords, primitive.colours, primitive.joints) == (
-        None,
-        (),
-        None,
-        None,
-    )
-    assert (primitive.material, primitive.morphs) == (None, ())
+    for name in ("normals", "colours", "joints", "material"):
+        assert getattr(primitive, name) is None
+    assert (primitive.texcoords, primitive.morphs) == ((), ())
 
 
 def test_attributes_may_be_interleaved(tmp_path: Path) -> None:
@@ -111,17 +107,13 @@ def test_points_and_lines_are_left_out(tmp_path: Path) -> None:
 
 def test_morph_targets_have_the_names_of_the_extras(tmp_path: Path) -> None:
     sheet = Sheet()
-    sparse = {"componentType": 5126, "count": 3, "type": "VEC3"}
-    sheet.json["accessors"].append(
-        sparse
-        | {
-            "sparse": {
-                "count": 1,
-                "indices": {"bufferView": sheet.bytes(b"\2\0"), "componentType": 5123},
-                "values": {"bufferView": sheet.bytes(np.array([0, 0, 4], "<f4").tobytes())},
-            }
-        }
-    )
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": sheet.bytes(b"\2\0"), "componentType": 5123},
+        "values": {"bufferView": sheet.bytes(np.array([0, 0, 4], "<f4").tobytes())},
+    }
+    accessor = {"componentType": 5126, "count": 3, "type": "VEC3", "sparse": sparse}
+    sheet.json["accessors"].append(accessor)
     sheet.show(sheet.triangle(targets=[{"POSITION": 0}, {"NORMAL": 0}]))
     mesh: dict[str, Any] = sheet.json["meshes"][0]
     for holder in (mesh, mesh["primitives"][0]):
@@ -131,8 +123,7 @@ def test_morph_targets_have_the_names_of_the_extras(tmp_path: Path) -> None:
         del holder["extras"]
     mesh["weights"] = [0.25, 1]
     (found,) = read_gltf(sheet.save(tmp_path / "a.glb")).meshes
-    assert found.morph_names == ("target 0", "target 1")
-    assert found.weights == (0.25, 1.0)
+    assert (found.morph_names, found.weights) == (("target 0", "target 1"), (0.25, 1.0))
     first, second = found.primitives[0].morphs
     assert first.tolist() == [[0, 0, 0], [0, 0, 0], [0, 0, 4]]
     assert second is None
@@ -150,7 +141,7 @@ def test_transforms_of_nodes(tmp_path: Path) -> None:
             "name": "arm",
             "translation": [10, 0, 0],
             "rotation": [0, 0, half, half],
-            "scale": [2, 2, 2],
+            "scale": [2] * 3,
         },
         {"matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 7, 8, 9, 1]},  # column by column
         {"translation": [1, 0, 0]},
@@ -230,8 +221,7 @@ def test_animations(tmp_path: Path) -> None:
     (animation,) = read_gltf(sheet.save(tmp_path / "a.glb")).animations
     turn, shift, morph = animation.channels  # the fourth animates no node
     assert (animation.name, turn.node, turn.path, turn.interpolation) == ("wave", 0, "rotation", "LINEAR")
-    assert turn.times.tolist() == [0, 0.5]
-    assert turn.values.tolist() == [[0, 0, 0, 1], [0, 1, 0, 0]]
+    assert (turn.times.tolist(), turn.values.tolist()) == ([0, 0.5], [[0, 0, 0, 1], [0, 1, 0, 0]])
     assert shift.values.tolist()[1] == [[9, 10, 11], [12, 13, 14], [15, 16, 17]]
     assert (morph.interpolation, morph.values.tolist()) == ("STEP", [[1, 2], [3, 4]])
 
@@ -324,6 +314,5 @@ def test_extensions_that_are_required(tmp_path: Path) -> None:
     with pytest.warns(FbaWarning, match="KHR_texture_basisu cannot be read; left out"):
         read_gltf(sheet.save(tmp_path / "a.glb"))
     sheet.json["extensionsRequired"] = ["KHR_materials_unlit", "KHR_texture_transform"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         read_gltf(sheet.save(tmp_path / "a.glb"))

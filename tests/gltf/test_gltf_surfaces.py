@@ -17,8 +17,7 @@ def test_transforms_move_positions_normals_and_morph_targets(tmp_path: Path) -> 
     sheet.show(primitive, translation=[5, 0, 0], scale=[2, 1, 1], name="face")
     sheet.json["meshes"][0]["extras"] = {"targetNames": ["smile"]}
     (surface,) = surfaces(read_gltf(sheet.save(tmp_path / "a.glb")))
-    assert surface.name == "face"
-    assert surface.positions.tolist() == [[5, 0, 0], [7, 0, 0], [5, 1, 0]]
+    assert (surface.name, surface.positions.tolist()) == ("face", [[5, 0, 0], [7, 0, 0], [5, 1, 0]])
     assert surface.triangles.tolist() == [[0, 1, 2]]
     assert surface.morphs["smile"].tolist() == [[0, 0, 0], [0, 0, 0], [2, 1, 1]]
     # stretched along x the surface leans towards y: (0.6 / 2, 0.8, 0), made unit

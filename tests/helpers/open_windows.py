@@ -16,10 +16,20 @@ from fba_player.window._window import Window
 def opened(animation: Animation, folder: Path, *, panels: bool, size: tuple[int, int] = (640, 480)) -> Window:
     if panels:
         graphics.imported("imgui_bundle")
+    return or_skip(lambda: Window(Scene(animation), size=size, panels=panels, folder=folder))
+
+
+def or_skip(open_it: Callable[[], Window]) -> Window:
+    """A window; skips where the virtual display has none."""
     try:
-        return Window(Scene(animation), size=size, panels=panels, folder=folder)
+        return open_it()
     except DisplayError as error:
         graphics.skip(f"no window on the virtual display: {error}")
+
+
+def press(window: Window, key: int, modifiers: int = 0) -> None:
+    """Press a key as glfw tells it."""
+    window.input.on_key(window._window, key, 0, 1, modifiers)
 
 
 def settle(window: Window) -> None:

@@ -1,4 +1,4 @@
-"""Sound files with one click, and where the click is in a film.
+"""Sound files, such with one click, and where the click is in a film.
 
 Sounds like speech, for which no program must be installed.
 """
@@ -7,9 +7,20 @@ import wave
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fba.arrays import Int16
 from fba.speech import RATE
+
+
+def write_wave(
+    path: Path, samples: ArrayLike | bytes, rate: int = 16000, channels: int = 1, width: int = 2
+) -> Path:
+    """Write samples (N,) or (N, channels) of 16 bits, or bytes as they are; returns the path."""
+    with wave.open(str(path), "wb") as file:
+        file.setparams((channels, width, rate, 0, "NONE", ""))
+        file.writeframes(samples if isinstance(samples, bytes) else np.asarray(samples, "<i2").tobytes())
+    return path
 
 
 def write_click(path: Path, at: float, *, seconds: float = 1.0, rate: int = 48000, channels: int = 1) -> Path:
@@ -17,12 +28,7 @@ def write_click(path: Path, at: float, *, seconds: float = 1.0, rate: int = 4800
     samples = np.zeros((round(seconds * rate), channels), dtype="<i2")
     first = round(at * rate)
     samples[first : first + rate // 500] = 30000
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(channels)
-        file.setsampwidth(2)
-        file.setframerate(rate)
-        file.writeframes(samples.tobytes())
-    return path
+    return write_wave(path, samples, rate, channels)
 
 
 def sound(path: Path) -> tuple[float, np.ndarray, int]:

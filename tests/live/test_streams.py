@@ -83,8 +83,7 @@ def test_a_stream_arrives_as_it_was_sent(scheme: str, kind: PayloadKind) -> None
 
     with StreamReceiver(target, wait=60) as receiver, sending(send):
         assert whole(receiver) == SENT
-        assert receiver.counts.planes == 60
-        assert receiver.counts.seconds == 2.4
+        assert (receiver.counts.planes, receiver.counts.seconds) == (60, 2.4)
 
 
 def test_a_description_says_how_it_is_coded() -> None:

@@ -12,7 +12,7 @@ from fba.capture.points import PointMotion
 from fba.errors import FbaWarning, ModelError
 from fba.face import FaceModel, FeaturePointFace
 from fba.persona import TrackedFace, from_point_motion
-from fba.persona._rest import find_rest
+from fba.persona._observation import find_rest
 from fba.persona.points import fit_face_points, mask_distance, register
 from fba.persona.points.layout import (
     PARTS,
@@ -119,8 +119,7 @@ def test_a_turned_face_is_laid_on_the_mask(yaw: float) -> None:
 
 def test_faces_turned_by_more_than_30_degrees_are_left_out() -> None:
     found = register(face_seen(31.0))
-    assert found.turned.tolist() == [True]
-    assert found.kept.tolist() == [False]
+    assert (found.turned.tolist(), found.kept.tolist()) == ([True], [False])
     assert np.isnan(found.points).all()
 
 

@@ -266,8 +266,7 @@ def test_vertices_too_far_apart_for_their_squares_are_counted_as_the_furthest() 
 
 def real_faces(shared: Path) -> Iterator[Animation]:
     for path in sorted((shared / "vectors/real").glob("*.fba")):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):
             animation = fba.decode(path.read_bytes(), bap_steps="visage")
         if animation.face is not None and animation.face.values.any() and len(animation) < 57:
             yield replace(animation, body=None)

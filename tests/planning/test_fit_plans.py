@@ -10,7 +10,7 @@ from fba import Animation, EncoderOptions, FaceTrack
 from fba.codec import quantise
 from fba.face import FaceSettings, resolve
 from fba.face._expressions import Definitions
-from fba.face.interpolation._terms import Function, Link, Term
+from fba.face.interpolation._node import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import fap_numbers, faps
 from fba.planning import encode_planned, plan_compact

@@ -186,8 +186,7 @@ def test_real_faces_take_less_than_deflate(shared: Path) -> None:
     options = EncoderOptions(bap_steps="visage", clamp=True)
     live = fixed = seconds = 0.0
     for path in sorted((shared / "vectors/real").glob("yes_*.fba")):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):
             animation = fba.decode(path.read_bytes(), bap_steps="visage")
         face = Animation(animation.rate, animation.index, animation.face)
         data, _ = encoded(face, options)

@@ -225,8 +225,7 @@ def test_real_streams(shared: Path) -> None:
     before = exact = seconds = compact = 0
     for path in sorted((shared / "vectors/real").glob("*.fba")):
         data = path.read_bytes()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):
             animation = fba.decode(data, bap_steps="visage")
         planned = encode_planned(animation, options)[0]
         assert len(planned) <= len(data)

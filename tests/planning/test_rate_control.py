@@ -342,8 +342,7 @@ def test_the_next_plane_at_no_price_and_at_any() -> None:
 def test_a_leaky_bucket() -> None:
     bucket = LeakyBucket(100, 50)
     bucket.add(40)
-    assert bucket.room == 10
-    assert bucket.level_at(0.1) == 30
+    assert (bucket.room, bucket.level_at(0.1)) == (10, 30)
     bucket.drain(0.3)
     assert bucket.level == 10
     bucket.add(5)

@@ -31,8 +31,7 @@ def small_scene(view: str = "figure", *, body: bool = False) -> Scene:
     """A face of few vertices that moves for two seconds."""
     faces = face_track([{3: 60 * (t % 8), 23: 6000 * (t % 5), 49: 2000 * (t % 7)} for t in range(50)])
     bodies = body_track([{32: 9000 * (t % 9), 8: 5000 * (t % 4)} for t in range(50)]) if body else None
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # it has no teeth
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):  # it has no teeth
         return Scene(Animation(25, np.arange(50), faces, bodies, "small"), small_face(), view=view)  # type: ignore[arg-type]
 
 

@@ -26,8 +26,7 @@ def test_the_head_of_the_body_is_shown_and_turned(body: BodyModel) -> None:
     animation = Animation(25, np.arange(2), face_track([{}, {yaw: QUARTER}]), body_track([{}, {}]))
     scene = Scene(animation, body=body)
     still, turned = scene.view_at(0.0), scene.view_at(1 / 25)
-    assert len(still.faces) == 1
-    assert len(still.eyes) == 0
+    assert (len(still.faces), len(still.eyes)) == (1, 0)
     box = slice(8 * list(BONES).index("head"), 8 * list(BONES).index("head") + 8)
     rows = head_rows(body)
     assert rows[box].all()

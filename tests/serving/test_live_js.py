@@ -94,5 +94,4 @@ def test_bytes_that_cannot_be_decoded_open_it_again(tmp_path: Path, bad: dict[st
 @pytest.mark.parametrize("before", [[], [{"open": 1}], [{"close": 1006}]])
 def test_closing_it(tmp_path: Path, before: list[dict[str, Any]]) -> None:
     called = play(tmp_path, [*before, {"end": 1}, {"end": 1}])
-    assert called.count(["state", "closed", 0]) == 1
-    assert called[-1] == ["state", "closed", 0]
+    assert (called.count(["state", "closed", 0]), called[-1]) == (1, ["state", "closed", 0])

@@ -20,32 +20,9 @@ INNER_LIPS = [
     for name in ("lower_t_midlip", "raise_b_midlip", "lower_t_lip_lm", "raise_b_lip_lm", "open_jaw")
 ]
 PHONES = [
-    "SIL",
-    "B",
-    "AA",
-    "B",
-    "P",
-    "UH",
-    "T",
-    "F",
-    "AY",
-    "V",
-    "TH",
-    "IH",
-    "N",
-    "M",
-    "AE",
-    "P",
-    "S",
-    "B",
-    "AY",
-    "DH",
-    "AH",
-    "M",
-    "UW",
-    "N",
-    "SIL",
-]
+    "SIL", "B", "AA", "B", "P", "UH", "T", "F", "AY", "V", "TH", "IH", "N", "M", "AE", "P", "S", "B", "AY",
+    "DH", "AH", "M", "UW", "N", "SIL",
+]  # fmt: skip
 CODINGS: tuple[Coding, ...] = ("visemes", "faps")
 
 
@@ -166,7 +143,6 @@ def test_life_moves_more_than_the_mouth(coding: Coding) -> None:
     still, alive = (perform(said, coding=coding, life=life) for life in (0.0, 1.0))
     numbers = fap_numbers()
     assert still.face is not None
-    assert alive.face is not None
     for name in ("head_pitch", "raise_l_i_eyebrow", "close_t_l_eyelid", "head_yaw"):
         column = numbers[name] - 1
         assert not still.face.values[:, column].any()
@@ -177,7 +153,6 @@ def test_life_moves_more_than_the_mouth(coding: Coding) -> None:
 def test_eyes_blink_every_few_seconds_without_a_pause() -> None:
     said = Speech(tuple(Phone("AA", at / 10, (at + 1) / 10) for at in range(300)), (), 30.0)
     face = perform(said, life=1).face
-    assert face is not None
     lids = face.values[:, fap_numbers()["close_t_l_eyelid"] - 1] == 700
     assert 4 <= np.count_nonzero(lids[1:] & ~lids[:-1]) <= 12
 

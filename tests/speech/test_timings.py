@@ -76,32 +76,19 @@ Object class = "TextGrid"
 "P"
 """
 CTM = ";; made by an aligner\nmap 1 0.00 0.10 M_B 0.99\nmap 1 0.10 0.30 AE_I 0.98\nmap 1 0.40 0.10 P_E 1.0\n"
+CUES = [(0.0, 0.1, "A"), (0.1, 0.4, "D"), (0.4, 0.5, "A")]
 RHUBARB_JSON = json.dumps(
     {
         "metadata": {"soundFile": "map.wav", "duration": 0.5},
-        "mouthCues": [
-            {"start": 0.0, "end": 0.1, "value": "A"},
-            {"start": 0.1, "end": 0.4, "value": "D"},
-            {"start": 0.4, "end": 0.5, "value": "A"},
-        ],
+        "mouthCues": [{"start": start, "end": end, "value": mouth} for start, end, mouth in CUES],
     }
 )
 RHUBARB_TSV = "0.00\tA\n0.10\tD\n0.40\tA\n0.50\tX\n"
 AZURE = json.dumps(
-    [
-        {"audio_offset": 0, "viseme_id": 21},
-        {"audio_offset": 1_000_000, "viseme_id": 1},
-        {"audio_offset": 4_000_000, "viseme_id": 21},
-    ]
+    [{"audio_offset": at, "viseme_id": number} for at, number in ((0, 21), (1_000_000, 1), (4_000_000, 21))]
 )
 OCULUS = json.dumps(
-    {
-        "visemes": [
-            {"time": 0.0, "viseme": "PP"},
-            {"time": 0.1, "viseme": "aa"},
-            {"time": 0.4, "viseme": "PP"},
-        ]
-    }
+    {"visemes": [{"time": at, "viseme": name} for at, name in ((0.0, "PP"), (0.1, "aa"), (0.4, "PP"))]}
 )
 SRT = """1
 00:00:00,000 --> 00:00:00,100

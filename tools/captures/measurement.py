@@ -66,8 +66,7 @@ def measure_markers(
 
 def measure_take(take: Take, motion: MarkerMotion, model: FaceModel | None = None) -> Errors:
     """Return the errors of a capture of a take whose FAPs are known."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         face = find_face(motion, neutral="first", model=model)
     shown = [fap for fap in face.sent if fap not in _lip_mates(face.sent)]
     return root_mean_squares(face.faps, take.faps, tuple(shown))
@@ -91,8 +90,7 @@ def measure_points(head: FaceModel, performed: Float64, rate: int) -> dict[str, 
         noise = np.random.default_rng(1).normal(0, NOISE * size, take.motion.positions.shape)
         for way, positions in (("exact", take.motion.positions), ("0.3 mm", take.motion.positions + noise)):
             motion = replace(take.motion, positions=positions, aspect=16 / 9)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", FbaWarning)
+            with warnings.catch_warnings(action="ignore", category=FbaWarning):
                 face = find_point_face(motion, neutral="first")
             result[f"{name}, {way}"] = root_mean_squares(face.faps, take.faps, face.sent)
     return result
@@ -115,8 +113,7 @@ def measure_marker_file(folder: Path, name: str, take: Take) -> tuple[Errors, fl
     The second is the root mean square error of the head's path, millimetres.
     """
     path = marker_files.write(folder, name, take.motion)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         animation = fba.read(path, neutral="first")
     assert animation.face is not None
     assert animation.body is not None

@@ -51,8 +51,7 @@ def _check_stream(parts: list[bytes], reader: PacketReader) -> None:
         raise ContractError(f"{counts.planes} planes are counted, and {len(parts)} were passed on")
     if not parts:
         return
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         try:
             decoded = fba.Decoder()
             planes = len(decoded.push(b"".join(parts) + _END)) + len(decoded.finish())

@@ -80,8 +80,7 @@ def _check(data: bytes, *, face: bool, body: bool) -> Outcome:
     animation = _animation(rng, count, face, body)
     manners = (_within_tolerance, _at_best) if searched else _MANNERS
     manner = manners[int(rng.integers(len(manners)))]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         accepted = [_encoded(one, animation, options, rng) for one in (_whole, manner)]
     return Outcome(all(accepted))
 

@@ -323,8 +323,7 @@ def _arrays() -> list[np.ndarray]:
 @contextmanager
 def _strict_warnings() -> Iterator[None]:
     """Make every warning of another library an error."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         warnings.simplefilter("ignore", FbaWarning)
         yield
 

@@ -37,8 +37,7 @@ def check_stream(data: bytes, _folder: Path | None = None) -> Outcome:
     Where the stream is divided into chunks depends on its content.
     """
     random = Random(crc32(data))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         ours, error, _ = _decode(data, [len(data)], "raise")
         cuts = sorted(random.randrange(len(data) + 1) for _ in range(random.choice((1, 2, 8))))
         if random.random() < 0.5:  # the salvaging decoder always gets chunks
@@ -89,8 +88,7 @@ def compare(data: bytes) -> None:
 
     Raises ContractError.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         ours = plane_records(_good_frames(data))
         reader = independent_planes(data)
         for number, record in enumerate(ours):

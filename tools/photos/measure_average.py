@@ -4,7 +4,7 @@ python -m tools.photos.measure_average FACE.obj LANDMARKS.json
 
 FACE.obj: an average of faces, looking along +z. LANDMARKS.json: a list of the numbers of 68 of its vertices,
 in dlib's order, or an object with that list as `idx_to_landmark_verts`, as ICT FaceKit has it. Writes the
-table of `fba/face/fitting/_average.py`, from the built-in head as it is now.
+table of `fba/face/fitting/_measures.py`, from the built-in head as it is now.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fba.face import FaceModel
 from fba.face.calibration._field import deformation
 from fba.face.feature_points import names
 from fba.face.fitting import FRONT_POINTS, SIDE_POINTS
-from fba.face.fitting._average import forms
+from fba.face.fitting._measures import forms
 from fba.geometry import fit_similarity
 from fba.mesh import connected, read_obj, triangulate, vertex_normals
 from fba.parameters import point_rows

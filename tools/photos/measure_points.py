@@ -41,8 +41,7 @@ def measure(shown: Iterable[Picture]) -> dict[str, Float64]:
     """Return the errors (pictures, P) by head; all NaN where no face was found."""
     result: dict[str, list[Float64]] = {}
     for picture in shown:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             try:
                 off = errors(find_front_points(picture.photograph), picture)
             except ModelError:

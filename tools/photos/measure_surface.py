@@ -88,8 +88,7 @@ def photographed(head: FaceModel, number: int, *, side: bool) -> FaceModel:
         points = {name: (float(x), float(y)) for name, (x, y) in zip(known, places, strict=True)}
         pixels = np.full((SIZE[1], SIZE[0], 3), 150, dtype=np.uint8)
         photos.append(Photo(Photograph(pixels, SIZE, f"{yaw:g}"), points))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         base = replace(FaceModel.default(), tables=(), levels=())  # only the shape is measured
         return fit_head(base, photos[0], photos[1] if side else None, eyes=eyes)[0]
 

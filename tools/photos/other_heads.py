@@ -50,8 +50,7 @@ class Picture:
 
 def other_heads(shared: Path, names: Iterable[str] = tuple(SHARED)) -> dict[str, FaceModel]:
     """Return heads of the shared folder by name, those that are there."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         heads = {n: import_model(shared / SHARED[n]) for n in names if (shared / SHARED[n]).exists()}
     return {name: with_placed(head, name) for name, head in heads.items()}
 
@@ -78,8 +77,7 @@ def pictures(
     """Yield pictures of a head from up to 10 degrees beside and above the front, in varied light."""
     random = np.random.default_rng(seed)
     row, numbers = point_rows(), fap_numbers()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         scene = player.Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model=head)
     deform = Deformer(head)
     with player.Offscreen(scene, size, samples=2) as view:

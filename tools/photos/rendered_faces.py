@@ -73,8 +73,7 @@ def varied_head(random: np.random.Generator, *, brows: bool = True) -> FaceModel
     )
     points[outer] = base.points[outer] + shift.reshape(-1, 3)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             head = fit(replace(base, tables=()), points, unit="m")
     except FbaError:
         return None

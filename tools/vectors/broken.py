@@ -117,8 +117,7 @@ def _decode(walker: Callable[..., trace.Walker], data: bytes, bap_steps: BapTabl
 def find(mistake: Mistake, vectors: Iterable[tuple[Vector, Listing]]) -> list[str]:
     """Return the names of the vectors that find a mistake. Long ones are tried only if no other does."""
     names: list[str] = []
-    with broken_decoder(mistake) as decode, warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with broken_decoder(mistake) as decode, warnings.catch_warnings(action="ignore", category=FbaWarning):
         for vector, expected in sorted(vectors, key=lambda pair: len(pair[1].planes) > LONG):
             if vector.optional or (names and len(expected.planes) > LONG):
                 continue

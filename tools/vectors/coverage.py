@@ -47,8 +47,7 @@ def _reached_by(vector: Vector) -> set[str]:
     data = vector.data()
     elements: list[Element] = []
     reading = trace(data, bap_steps=vector.bap_steps)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         unobserved = vector.planes_before - OBSERVED
         while unobserved > 0 and (not elements or (elements[-1].plane or 0) < unobserved):
             elements.append(next(reading))

@@ -42,8 +42,7 @@ def write_vectors(folder: Path, vectors: Iterable[Made]) -> int:
 
 def made_vectors() -> Iterator[Made]:
     """Yield all vectors, made anew."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         for group, case in cases():
             data = case.make()
             yield valid_entry(group, case, data)

@@ -134,8 +134,7 @@ def _try_encoder(program: Program, vector: Vector) -> tuple[str, str]:
     """Return what is wrong with an encoder, and why it was not tried; "" and "" if it is right."""
     if vector.damaged or vector.optional or not vector.times:
         return "", "not for encoders: damaged, optional or of doubtful times"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         records = decode_values(vector.data(), bap_steps=vector.bap_steps)
     expected = Listing(trace_values(records))
     places: dict[str, set[str]] = {
@@ -166,8 +165,7 @@ def _stream_difference(expected: Listing, data: bytes, bap_steps: BapTable) -> s
     """Return how a stream that an encoder wrote differs from the values given to it, "" if in nothing."""
     found = []
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             for plane in planes(data, bap_steps=bap_steps):
                 found += trace_values([plane])
                 if len(found) > len(expected.planes):

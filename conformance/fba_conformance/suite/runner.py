@@ -20,8 +20,7 @@ def check(vector: Vector) -> Result:
     """Decode a vector and, if its bytes can be reproduced, encode it again."""
     begin = time.perf_counter()
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             result = _check_damaged(vector) if vector.damaged else _check_valid(vector)
     except (FbaError, OSError) as error:
         result = Result(vector.name, False, None, str(error))
@@ -38,8 +37,7 @@ def expected_listing(vector: Vector) -> Listing:
     listing = vector.listing()
     if listing is not None:
         return listing
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         try:
             listing = _codec_listing(vector)
         except FbaError:

@@ -12,20 +12,6 @@ from fba.body.gait._reduction import Errors, Reduced, compare_walks, reduce
 from fba.body.gait._synthesis import walk
 
 __all__ = [
-    "POSES",
-    "Character",
-    "Cycle",
-    "Errors",
-    "Gait",
-    "Pose",
-    "Reduced",
-    "Soles",
-    "Step",
-    "advance",
-    "characters",
-    "compare_walks",
-    "detect",
-    "reduce",
-    "soles",
-    "walk",
-]
+    "POSES", "Character", "Cycle", "Errors", "Gait", "Pose", "Reduced", "Soles", "Step", "advance",
+    "characters", "compare_walks", "detect", "reduce", "soles", "walk",
+]  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 from fba.arrays import Bool, Float64
 from fba.capture.blendshapes.shape_table import shape_faps, with_mates
 from fba.face import arkit_of
-from fba.face.gaze import limit_gaze
+from fba.face.eyeball import limit_gaze
 from fba.name_maps import key_of
 from fba.parameters import FAP_COUNT, fap_numbers
 from fba.tracks import FaceTrack

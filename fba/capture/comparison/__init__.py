@@ -12,16 +12,6 @@ from fba.capture.comparison._stick import Stick, find_sticks
 from fba.capture.comparison._verdict import GRADES, Bounds, Comparison, Difference, bounds
 
 __all__ = [
-    "GRADES",
-    "Bounds",
-    "Comparison",
-    "Difference",
-    "Figure",
-    "Stick",
-    "bounds",
-    "compare",
-    "find_sticks",
-    "find_up",
-    "source_figure",
-    "source_scale",
-]
+    "GRADES", "Bounds", "Comparison", "Difference", "Figure", "Stick", "bounds", "compare", "find_sticks",
+    "find_up", "source_figure", "source_scale",
+]  # fmt: skip

@@ -16,8 +16,8 @@ from fba.capture.comparison import _figure as figure
 from fba.capture.comparison import _path_measures as path_measures
 from fba.capture.comparison import _pose_measures as pose_measures
 from fba.capture.comparison._figure import Figure
+from fba.capture.comparison._path_measures import Floor, find_floor, find_standing
 from fba.capture.comparison._pose_measures import Row
-from fba.capture.comparison._standing import Floor, find_floor, find_standing
 from fba.capture.comparison._verdict import Comparison, Difference, bounds, in_order
 from fba.capture.motion import SkeletonMotion
 from fba.errors import ModelError

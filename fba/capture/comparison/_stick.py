@@ -15,7 +15,7 @@ from fba.capture.comparison import _figure as figure
 from fba.capture.comparison import _measurement as measurement
 from fba.capture.comparison import _path_measures as path_measures
 from fba.capture.comparison import _pose_measures as pose_measures
-from fba.capture.comparison._standing import find_floor, find_standing
+from fba.capture.comparison._path_measures import find_floor, find_standing
 from fba.capture.motion import SkeletonMotion
 from fba.parameters import BAP_COUNT
 from fba.rotations import unit

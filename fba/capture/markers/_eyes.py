@@ -9,7 +9,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.capture.markers._targets import LOWER_LIDS, PUPILS
-from fba.face.gaze import LARGEST_GAZE
+from fba.face.eyeball import LARGEST_GAZE
 from fba.parameters import point_rows
 
 

@@ -27,7 +27,7 @@ from fba.capture.markers.marker_maps import check_map, find_map
 from fba.choices import Gaze
 from fba.errors import ModelError, OptionError, warn
 from fba.face import FaceModel, Fapu
-from fba.face.gaze import limit_gaze
+from fba.face.eyeball import limit_gaze
 from fba.face.points import HEAD_PITCH, HEAD_ROLL, HEAD_YAW, PITCH_EYE, YAW_EYE
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.name_maps import list_names

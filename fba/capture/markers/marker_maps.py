@@ -151,8 +151,7 @@ def summarise(motion: MarkerMotion) -> dict[str, Any]:
     placed: dict[str, str] = {}
     found_by = ""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             if len(motion):
                 placed, found_by = find_map(motion)
     except ModelError:

@@ -16,7 +16,7 @@ import numpy as np
 from fba.arrays import Float64
 from fba.capture.markers._solving import measure_responses
 from fba.capture.markers._targets import PUPILS, RIGID
-from fba.capture.points.poses import Poses, fit_poses
+from fba.capture.points.picture import Poses, fit_poses
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.parameters import faps, point_rows

@@ -11,16 +11,6 @@ from fba.capture.virtual_markers.performance import MarkerPerformance, move_head
 from fba.capture.virtual_markers.proposal import propose_mapping
 
 __all__ = [
-    "Influence",
-    "MarkedHead",
-    "MarkerMapping",
-    "MarkerPerformance",
-    "VirtualMarker",
-    "find_influence",
-    "head_of_model",
-    "move_head",
-    "propose_mapping",
-    "read_head",
-    "read_mapping",
-    "write_mapping",
-]
+    "Influence", "MarkedHead", "MarkerMapping", "MarkerPerformance", "VirtualMarker", "find_influence",
+    "head_of_model", "move_head", "propose_mapping", "read_head", "read_mapping", "write_mapping",
+]  # fmt: skip

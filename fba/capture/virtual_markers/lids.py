@@ -16,7 +16,7 @@ from fba.capture.markers._targets import LOWER_LIDS
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.influence import Influence
 from fba.errors import ModelError
-from fba.face.gaze import LARGEST_GAZE
+from fba.face.eyeball import LARGEST_GAZE
 from fba.parameters import point_rows
 from fba.rotations import axis_matrices
 

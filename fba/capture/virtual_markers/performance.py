@@ -14,11 +14,10 @@ from fba.capture.markers._gaps import fill_gaps, often_seen, warn_of_gaps
 from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._neutral import neutral_frames
 from fba.capture.markers._stabilisation import follow_head, relate_poses, remove_poses
-from fba.capture.virtual_markers._alignment import lay_onto
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import Eye, find_eyes, narrow, turn_to_camera
-from fba.capture.virtual_markers.mapping import MarkerMapping
-from fba.capture.virtual_markers.weights import MarkerWeights, find_weights
+from fba.capture.virtual_markers.mapping import MarkerMapping, MarkerWeights, find_weights
+from fba.capture.virtual_markers.proposal import lay_onto
 from fba.choices import Gaze
 from fba.errors import ModelError, warn
 

@@ -1,4 +1,4 @@
-"""`propose_mapping`: a first mapping, by places of the markers and feature points of the head."""
+"""`propose_mapping`: a first mapping, by places of the markers, laid onto feature points of the head."""
 
 from __future__ import annotations
 
@@ -10,12 +10,43 @@ from fba.arrays import Float64
 from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import LIDS, RIGID, SKULL, target_points
 from fba.capture.markers.marker_maps import find_map
-from fba.capture.virtual_markers._alignment import lay_onto
 from fba.capture.virtual_markers._heads import MarkedHead
 from fba.capture.virtual_markers.lids import lid_at, lid_height
 from fba.capture.virtual_markers.mapping import MarkerMapping, VirtualMarker
 from fba.errors import ModelError
+from fba.geometry import FittedSimilarity, fit_similarity, principal_axes
 from fba.parameters import point_rows
+
+MIN_POINTS = 3
+"""Smallest number of points that define an alignment."""
+MIN_SPREAD = 0.02
+"""Smallest sideways spread of points, as a share of their length."""
+MAX_MIRROR_RATIO = 0.5
+"""Largest ratio of the error of the mirror image to that of the points if these are mirrored."""
+MIN_MIRROR_ERROR = 0.05
+"""Smallest error of mirrored points, as a share of their size: flat sets of markers do not show it."""
+
+
+def lay_onto(points: Float64, places: Float64) -> FittedSimilarity:
+    """Return the similarity that lays points (K, 3) onto places (K, 3), by least squares.
+
+    The determinant of its rotation is -1 if the points are mirrored. ModelError for fewer than three points,
+    or points on one line.
+    """
+    if len(points) < MIN_POINTS:
+        raise ModelError(
+            f"{len(points)} markers with a vertex cannot be laid onto a head: "
+            f"{MIN_POINTS} at least are needed"
+        )
+    for what, cloud in (("markers", points), ("vertices of the virtual markers", places)):
+        _, spread = principal_axes(cloud)
+        if not spread[1] > MIN_SPREAD * spread[0]:
+            raise ModelError(f"the {what} are all on one line, or in one place")
+    plain, mirrored = (fit_similarity(points, places, reflected=reflected) for reflected in (False, True))
+    size = float(np.sqrt(((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    is_mirrored = mirrored.error < MAX_MIRROR_RATIO * plain.error and plain.error > MIN_MIRROR_ERROR * size
+    return mirrored if is_mirrored else plain
+
 
 MIN_PLACES = 6
 """Smallest number of markers at places that the head has. They show where the other markers are."""

@@ -144,8 +144,7 @@ def _report_face(
             _print_markers(markers)
         return {"file": str(path), "format": reader.name, "size": size, "markers": markers}
     capture = captured.describe()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # the description has them
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):  # the description has them
         animation = make_animation(captured, path=file, limits=limits).animation
     info = StreamInfo.of_animation(animation, reader.name, size)
     if printed:
@@ -167,8 +166,7 @@ def _find_in_body(file: Path, reader: Format, reading: Reading) -> tuple[str, ..
         "salvage": True,
         "limits": reading.limit,
     }
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)  # the description has them
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):  # the description has them
         finding = find_in_body(reader.read(file, **taken_options(given, reader.read_options)))
     return () if finding is None else (finding,)
 

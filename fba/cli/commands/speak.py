@@ -217,7 +217,7 @@ def _speak_live(
     if manner.coding == "visemes":
         raise click.UsageError("--audio - sends low-level FAPs; leave --coding visemes out")
     outputs = Outputs([Output("--output", output)], [STANDARD], no_clobber=no_clobber)
-    from fba.cli.recordings.live_speech import speak_live
+    from fba.cli.recordings.voice import speak_live
 
     speech, recorder = speak_live(
         output, raw_rate=said.pcm, rate=manner.rate, style=manner.style, life=manner.life, moods=moods

@@ -25,9 +25,8 @@ from fba.face.fitting._features import (
     to_standard,
     whole_likeness,
 )
-from fba.face.fitting._found import FoundPoints, Step
 from fba.face.fitting._head import DISTANCE
-from fba.face.fitting._photographs import Photograph
+from fba.face.fitting._photographs import FoundPoints, Photograph, Step
 from fba.face.fitting._points_file import FRONT_POINTS
 from fba.face.fitting._views import Observation, first_view, solve
 from fba.parameters import point_rows

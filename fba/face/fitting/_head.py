@@ -12,9 +12,8 @@ from fba.errors import ModelError, warn
 from fba.face import FaceModel
 from fba.face.calibration import fit
 from fba.face.feature_points import MIRRORED
-from fba.face.fitting._average import with_average_forms
 from fba.face.fitting._brows import BROWS
-from fba.face.fitting._measures import Measure, measure
+from fba.face.fitting._measures import Measure, measure, with_average_forms
 from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS, HIDDEN, SIDE_POINTS, Points, check_inside
 from fba.face.fitting._skin import paint

@@ -1,9 +1,9 @@
-"""Photographs: read upright, as colours, and no larger than a head's skin needs."""
+"""Photographs: read upright, as colours, no larger than a skin needs; what finders of points return."""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -82,3 +82,26 @@ def read_photograph(path: str | os.PathLike[str], *, limits: Limits = DEFAULT_LI
     if photograph.grey:
         warn(f"{path}: the picture has no colours; the skin of the head will be grey, too", stacklevel=2)
     return photograph
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A picture of one step: uint8 (H, W, 3), and what it shows."""
+
+    title: str
+    pixels: UInt8
+
+
+@dataclass(frozen=True, eq=False)
+class FoundPoints:
+    """Points that were found on a photograph.
+
+    points: pixels to the right and down by name. score: how well they look like those of a face, 0 to 1.
+    steps: pictures of how they were found. doubts: by part of the face (eyes, brows, nose, mouth, chin), how
+    far its points are apart when they are found from several places, in distances between the pupils.
+    """
+
+    points: dict[str, tuple[float, float]]
+    score: float
+    steps: list[Step] = field(default_factory=list)
+    doubts: dict[str, float] = field(default_factory=dict)

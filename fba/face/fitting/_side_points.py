@@ -11,8 +11,7 @@ from scipy.ndimage import binary_fill_holes, gaussian_filter1d, label
 
 from fba.arrays import Bool, Float64, UInt8
 from fba.errors import ModelError
-from fba.face.fitting._found import FoundPoints, Step
-from fba.face.fitting._photographs import Photograph
+from fba.face.fitting._photographs import FoundPoints, Photograph, Step
 
 ROWS = 480
 """Rows of the copy of the picture in which the outline is followed."""

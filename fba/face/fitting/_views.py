@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fba.arrays import Float64, Floating
-from fba.capture.points.poses import fit_poses
+from fba.capture.points.picture import fit_poses
 from fba.parameters import point_rows
 from fba.rotations import turn as rotation_about
 

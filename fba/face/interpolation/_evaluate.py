@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fba.arrays import Bool, Float64, Int16, Intp
-from fba.face.interpolation._terms import HIGH_LEVEL_NUMBERS, Function, Link, Term
+from fba.face.interpolation._node import HIGH_LEVEL_NUMBERS, Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import INTENSITY_MAX, fap_numbers, faps
 

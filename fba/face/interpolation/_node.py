@@ -1,37 +1,72 @@
-"""The FIT as the flat lists of its BIFS node, ISO/IEC 14496-1.
-
-Where no public text defines the node, we decided:
-
-- Graph counts sets from 1: its bounds are 0..68, those of FAPs, which count from 1, and counting from
-  0 would never reach 68. A Graph that contains a 0 is read as counting from 0.
-- FAP 1 in a source set stands for three numbers (select1, select2, blend), FAP 2 for four (select1,
-  intensity1, select2, intensity2), in the order in which a stream sends them.
-- numeratorTerms and denominatorTerms hold one count for each FAP of each link's destination set, links
-  in the order of Graph, FAPs in the order of their set. Exponents and coefficients have the same order,
-  term by term; a term has one exponent for each number of the source set. A numerator without terms is
-  0, a denominator 1.
-- numeratorImpulse holds a pair (s, a) for each numerator term of the links whose source set contains
-  FAP 1 or 2, and nothing for the others: the term is 0 unless the s-th number of the source set, counted
-  from 1, equals a; (0, 0) sets no condition. The s-th number must be a select.
-"""
+"""Terms, functions and links of an interpolation table (FIT); its BIFS node's flat lists, ISO/IEC 14496-1."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from fba.errors import ModelError
-from fba.face.interpolation._terms import (
-    EXPONENT_MAX,
-    HIGH_LEVEL_NUMBERS,
-    TERMS_MAX,
-    Function,
-    Link,
-    Term,
-    to_float,
-)
-from fba.parameters import FAP_COUNT, fap_numbers, faps
+from fba.parameters import EXPRESSION_FIELDS, FAP_COUNT, VISEME_FIELDS, fap_numbers, faps
+
+EXPONENT_MAX = 15
+"""Largest exponent in a FIT node."""
+TERMS_MAX = 10
+"""Most terms of a numerator or denominator in a FIT node."""
+HIGH_LEVEL_NUMBERS = {"viseme": VISEME_FIELDS[:3], "expression": EXPRESSION_FIELDS[:4]}
+"""The numbers that FAP 1 and FAP 2 stand for in a source set."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """coefficient x product of powers if the impulse is met, else 0.
+
+    coefficient: finite. powers: exponent 0..15 of each number of the source set, by name; absent is 0.
+    when: (select, value), such as ("expression_select1", 1), or None for always; numerators only.
+    """
+
+    coefficient: float = 1.0
+    powers: Mapping[str, int] = field(default_factory=dict)
+    when: tuple[str, int] | None = None
+
+
+@dataclass(frozen=True)
+class Function:
+    """A destination FAP as numerator (empty: 0) / denominator (empty: 1), sums of at most 10 terms."""
+
+    numerator: Sequence[Term] = ()
+    denominator: Sequence[Term] = ()
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link from one set of FAPs to another.
+
+    source: names of its FAPs, such as ("lower_t_midlip", "raise_b_midlip"). "viseme" stands for the
+    numbers viseme_select1, viseme_select2 and viseme_blend, "expression" for expression_select1,
+    expression_intensity1, expression_select2 and expression_intensity2 (both 0..63 as sent).
+    functions: the destination set, each of its FAPs with its function.
+    """
+
+    source: Sequence[str]
+    functions: Mapping[str, Function]
+
+    @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of the numbers that the functions may use, in order."""
+        return tuple(n for name in self.source for n in HIGH_LEVEL_NUMBERS.get(name, (name,)))
+
+
+def to_float(value: object) -> float:
+    """Return the value as a float; NaN if it is not a number."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
+
 
 INTEGER_FIELDS = {
     "FAPs": (-1, FAP_COUNT),
@@ -67,9 +102,9 @@ def links_from_node(node: Mapping[str, Sequence[float]]) -> list[Link]:
         where = f"link {len(links) + 1} of the FIT"
         source, destination = (_set(sets, int(number) - base, where) for number in graph.take(2, ""))
         links.append(_link(source, destination, fields, where))
-    for field in fields.values():
-        if field.left:
-            raise ModelError(f"{field.name} of the FIT holds {field.left} numbers more than its links need")
+    for rest in fields.values():
+        if rest.left:
+            raise ModelError(f"{rest.name} of the FIT holds {rest.left} numbers more than its links need")
     return links
 
 

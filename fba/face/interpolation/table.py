@@ -27,7 +27,7 @@ from typing import Any
 
 from fba.errors import ModelError
 from fba.face.interpolation import _node
-from fba.face.interpolation._terms import EXPONENT_MAX, TERMS_MAX, Function, Link, Term, to_float
+from fba.face.interpolation._node import EXPONENT_MAX, TERMS_MAX, Function, Link, Term, to_float
 from fba.parameters import (
     EXPRESSION_FIELDS,
     EXPRESSION_SELECT_MAX,

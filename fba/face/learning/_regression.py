@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fba.arrays import Bool, Float64, Int32
-from fba.face.interpolation._terms import TERMS_MAX, Function, Link, Term
+from fba.face.interpolation._node import TERMS_MAX, Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import FAP_COUNT, faps
 

@@ -17,9 +17,8 @@ from fba.capture import PointMotion
 from fba.errors import FormatError, Remedy
 from fba.formats.face_tables._points import build_points
 from fba.formats.face_tables._tables import regular_seconds
-from fba.formats.numpy_archives import NPY, read_arrays
 from fba.formats.text.frame_rates import Rate
-from fba.formats.zip_files import ZIP
+from fba.formats.zip_files import NPY, ZIP, read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, naming_file
 

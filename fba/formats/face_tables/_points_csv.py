@@ -32,16 +32,8 @@ MILLISECONDS = ("timestamp_ms", "time_ms", "timestampms", "milliseconds", "ms")
 FRAMES = ("frame", "frame_id", "frame_number", "frame_idx", "frame_index", "framenum", "image_id")
 FACES = ("face_id", "face", "Identity", "person_id", "face_idx", "face_index")
 POINTS = (
-    "landmark",
-    "landmark_id",
-    "landmark_index",
-    "landmark_idx",
-    "point",
-    "point_id",
-    "index",
-    "idx",
-    "id",
-)
+    "landmark", "landmark_id", "landmark_index", "landmark_idx", "point", "point_id", "index", "idx", "id",
+)  # fmt: skip
 SIZES = (
     ("width", "height"),
     ("framewidth", "frameheight"),

@@ -199,8 +199,7 @@ def _find_head(table: Table, rows: Int64, times: Float64, rate: Fraction) -> tup
     x, y = (table.numbers([column[name] for name in axis])[rows] for axis in names[0])
     try:
         motion = PointMotion(np.stack([x, y], axis=2), times, rate)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):
             face = find_point_face(motion)
     except ModelError:  # the points are no face
         return None, left_out

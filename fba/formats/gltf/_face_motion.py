@@ -74,8 +74,7 @@ def find_face_clip(gltf: Gltf, clip: str | int | None) -> Clip | None:
     one clip.
     """
     clips = gltf.animations if clip is None else [choose_clip(gltf, clip, range(len(gltf.nodes)))]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         chosen = next((each for each in clips if read_face_motion(gltf, each, np.zeros(1)) is not None), None)
     if chosen is None or "|" not in chosen.name:
         return chosen

@@ -95,8 +95,7 @@ def make_person(
         return Captured(_read_face_alone(gltf, face_clip, rate, limits))
     motion = None
     try:
-        with warnings.catch_warnings(record=True) as said:
-            warnings.simplefilter("always", FbaWarning)
+        with warnings.catch_warnings(record=True, action="always", category=FbaWarning) as said:
             motion = _sample(gltf, clip, rate, limits)
             made = retarget_motion(motion, None, options, limits=limits)
     except ModelError as error:

@@ -21,9 +21,8 @@ from fba.capture import SkeletonMotion
 from fba.capture.blendshapes.combination import JAW_OPEN
 from fba.capture.blendshapes.conversion import convert_rows
 from fba.errors import FormatError, Remedy
-from fba.formats.numpy_archives import read_arrays
 from fba.formats.text.frame_rates import Rate
-from fba.formats.zip_files import ZIP
+from fba.formats.zip_files import ZIP, read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.sampling import find_rate, interpolate
 from fba.source import Path, naming_file, stem_of

@@ -93,8 +93,7 @@ class ValueParser:
 
 def _numbers(text: bytes) -> Float64 | None:
     """Return all numbers of a text; None if a word in it is no number."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)
+    with warnings.catch_warnings(action="error", category=DeprecationWarning):
         try:
             return np.fromstring(text, dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError):

@@ -14,9 +14,8 @@ import numpy as np
 from fba import geometry
 from fba.arrays import Bool, Float64
 from fba.capture import PointMotion
-from fba.capture.points.picture import face_misfit, upright_points
+from fba.capture.points.picture import face_misfit, fit_poses, upright_points
 from fba.capture.points.places import point_places, take_points
-from fba.capture.points.poses import fit_poses
 from fba.errors import ModelError, warn
 from fba.face import neutral_points
 from fba.parameters import point_rows

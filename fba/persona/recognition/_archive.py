@@ -15,8 +15,7 @@ import numpy as np
 
 from fba.arrays import Array, Float64
 from fba.errors import FormatError, UnsupportedError
-from fba.formats.numpy_archives import read_arrays
-from fba.formats.zip_files import ZIP
+from fba.formats.zip_files import ZIP, read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.source import Path, read_head
 

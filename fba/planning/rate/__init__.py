@@ -8,13 +8,6 @@ from fba.planning.rate._errors import DistanceErrors, ParameterErrors, ShownErro
 from fba.planning.rate._search import RatedStream, encode_at_rate
 
 __all__ = [
-    "DistanceErrors",
-    "LeakyBucket",
-    "ParameterErrors",
-    "RateEncoder",
-    "RateStatistics",
-    "RatedStream",
-    "ShownErrors",
-    "encode_at_rate",
-    "measure_errors",
-]
+    "DistanceErrors", "LeakyBucket", "ParameterErrors", "RateEncoder", "RateStatistics", "RatedStream",
+    "ShownErrors", "encode_at_rate", "measure_errors",
+]  # fmt: skip

@@ -193,8 +193,7 @@ class RateEncoder:
         marked = frame.body is not None and self.options.mark
         spare = TUNING.spare_bits + 8 * len(write_mark(self.options.bap_steps)) if marked else self._spare
         trial = copy.deepcopy(self._encoder)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FbaWarning)  # given below
+        with warnings.catch_warnings(action="ignore", category=FbaWarning):  # given below
             trial.settle(index)
             before = trial.bits
             self._begin_segment(trial, frame)

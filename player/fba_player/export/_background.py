@@ -136,8 +136,7 @@ def _export(pipe: Connection, scene: Any, path: str, options: ExportOptions) -> 
         pipe.send(("progress", (done, total)))
 
     try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", FbaWarning)
+        with warnings.catch_warnings(record=True, action="always", category=FbaWarning) as caught:
             write(scene, path, options, tell)
         for warning in caught:
             if issubclass(warning.category, FbaWarning):

@@ -39,15 +39,13 @@ def photo_sheet(photos: Sequence[Photo], head: PhotoHead, steps: Sequence[Step] 
     cells = [(step.title, Image.fromarray(step.pixels)) for step in steps]
     cells += [(photo.photograph.name, _with_points(photo)) for photo in photos]
     scene = Scene(Animation(Fraction(25), np.arange(1), FaceTrack.empty(1)), model=head.model)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
-        with Offscreen(scene, CELL) as view:
-            for title, yaw, values in VIEWS:
-                faps = np.zeros(FAP_COUNT)
-                for number, value in values.items():
-                    faps[number - 1] = value
-                view.camera = Camera(yaw=yaw).fit(scene.face_subject, CELL[0] / CELL[1])
-                cells.append((title, Image.fromarray(view.still(faps)[..., :3])))
+    with warnings.catch_warnings(action="ignore", category=FbaWarning), Offscreen(scene, CELL) as view:
+        for title, yaw, values in VIEWS:
+            faps = np.zeros(FAP_COUNT)
+            for number, value in values.items():
+                faps[number - 1] = value
+            view.camera = Camera(yaw=yaw).fit(scene.face_subject, CELL[0] / CELL[1])
+            cells.append((title, Image.fromarray(view.still(faps)[..., :3])))
     layout = lay_out(len(cells), (CELL[0], CELL[1] + LABEL), min(len(cells), 5))
     sheet = Image.new("RGB", layout.size, PAPER)
     pen = ImageDraw.Draw(sheet)

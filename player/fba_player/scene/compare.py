@@ -17,8 +17,7 @@ import numpy as np
 
 from fba.arrays import Float32, Float64
 from fba_player._mesh.textures import linear_light
-from fba_player.scene._compare_timeline import CompareTimeline
-from fba_player.scene._differences import Differences, differences
+from fba_player.scene._compare_timeline import CompareTimeline, Differences, differences
 from fba_player.scene._display_options import HAIRS
 from fba_player.scene._fap_heatmap import GLOSS, heat_colours, heat_legend, plain_colours
 from fba_player.scene._layout import Drawing, join_views, make_captions, move_view

@@ -25,9 +25,9 @@ from fba.capture.virtual_markers import (
 )
 from fba.capture.virtual_markers.influence import give_to_nearest
 from fba.capture.virtual_markers.lids import lid_at
+from fba.capture.virtual_markers.mapping import find_influences
 from fba.capture.virtual_markers.performance import Neutral, SteadyMarkers, perform_steady, steady
 from fba.capture.virtual_markers.proposal import usual_radius
-from fba.capture.virtual_markers.weights import find_influences
 from fba.choices import Assignment, Overlap
 from fba.errors import FbaError, FbaWarning
 from fba_player.scene._hand_editing import HandEditing
@@ -185,8 +185,7 @@ class MarkerEditing(HandEditing[MarkerMapping]):
     def _perform(self) -> MarkerPerformance | None:
         doubts: list[str] = []
         try:
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always", FbaWarning)
+            with warnings.catch_warnings(record=True, action="always", category=FbaWarning) as caught:
                 self.mapping.check(self.head)
                 markers = self._steady_markers()
                 made = perform_steady(self.motion, self.head, self.mapping, markers)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from fba.errors import FbaError
 from fba_player.scene._hand_editing import HandEditing
-from fba_player.scene._photo_editing import PhotoEditing
-from fba_player.scene._photo_scene import PhotoScene
+from fba_player.scene._photo_scene import PhotoEditing, PhotoScene
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.scene.marker_editing import MarkerEditing

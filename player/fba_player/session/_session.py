@@ -231,8 +231,7 @@ class Session:
         from fba.errors import FbaError
 
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # given again when they are opened
+            with warnings.catch_warnings(action="ignore"):  # given again when they are opened
                 for path in paths:
                     self.read(path)
         except (FbaError, OSError) as error:

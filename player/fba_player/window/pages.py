@@ -12,8 +12,7 @@ from fba.errors import DisplayError
 from fba.face.fitting import Photograph
 from fba.face.importers.head_surface import HeadSurface
 from fba_player.gl._context import cure
-from fba_player.scene._photo_editing import PhotoEditing, Spot
-from fba_player.scene._photo_scene import PhotoScene
+from fba_player.scene._photo_scene import PhotoEditing, PhotoScene, Spot
 from fba_player.scene._placement_scene import PlacementScene
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.scene.marker_editing import MarkerEditing

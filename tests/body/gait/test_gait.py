@@ -227,8 +227,7 @@ def test_stride_sets_the_speed() -> None:
 
 
 def test_rates_and_lengths() -> None:
-    assert len(gait.walk(cycles=2)) == 65
-    assert len(gait.walk(seconds=2)) == 60
+    assert (len(gait.walk(cycles=2)), len(gait.walk(seconds=2))) == (65, 60)
     walk = gait.walk(seconds=2, rate=Fraction(25))
     assert (walk.rate, len(walk)) == (25, 50)
     assert period(gait.walk(cycles=1, rate=120), 1) == 128

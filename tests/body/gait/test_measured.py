@@ -32,7 +32,6 @@ def deviations_of_normal_walk() -> tuple[np.ndarray, np.ndarray]:
     lines = [line for line in MEASURED.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
     table = np.array(list(csv.reader(lines))[1:], dtype=np.float64)
     walk = gait.walk(cycles=1, rate=60)
-    assert walk.body is not None
     solver, skeleton = BapSolver(), Skeleton.default()
     matrices = solver.pose(np.vstack([walk.body.values, np.zeros((1, 296), dtype=np.int32)]))
     hip, knee, ankle = (matrices[:, skeleton.number(f"r_{name}"), :3, 3] for name in ("hip", "knee", "ankle"))
@@ -57,7 +56,6 @@ def test_a_leg_that_swings_is_within_one_deviation() -> None:
 def test_the_pelvis_is_lowest_on_two_feet_and_highest_on_one() -> None:
     """The second half of the cycle repeats the first; the other foot stands until 7 % of it and from 50 %."""
     walk = gait.walk(cycles=1, rate=60)
-    assert walk.body is not None
     height = walk.body.values[:32, 180]
     assert 0 <= np.argmin(height) <= 4
     assert 16 <= np.argmax(height) <= 24
@@ -68,14 +66,12 @@ def test_the_pelvis_is_lowest_on_two_feet_and_highest_on_one() -> None:
 def test_the_pelvis_rises_and_falls(character: str, low: float, high: float) -> None:
     """Centimetres: 4 to 5 at 1.3 m/s, less at 0.8 m/s."""
     walk = gait.walk(character=character, cycles=1, rate=60)
-    assert walk.body is not None
     assert low <= np.ptp(walk.body.values[:, 180]) / 10 <= high
 
 
 def test_a_sneaking_foot_lands_softly() -> None:
     """Its knee slows down by at most 12 mm a frame, at 30 frames/s, when the foot touches the ground."""
     walk = gait.walk(character="sneaking", cycles=2)
-    assert walk.body is not None
     knee = BapSolver().pose(walk.body.values)[:, Skeleton.default().number("r_knee"), :3, 3]
     change = 1000 * np.linalg.norm(np.diff(knee, 2, axis=0), axis=1)
     assert change[50:62].max() < 12  # about frame 56, the contact

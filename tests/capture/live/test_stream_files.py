@@ -51,8 +51,7 @@ def test_a_file_holds_all_frames_but_the_last_at_any_moment(parts: tuple[str, ..
         recorder.push(whole[frame : frame + 1])
         assert path.exists() == (frame > 0)
         if frame:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")  # as for one that was cut off
+            with warnings.catch_warnings(action="error"):  # as for one that was cut off
                 assert len(fba.read(path)) == frame
     recorder.finish()
     at_once = fba.Encoder(recorder.options)
@@ -103,8 +102,7 @@ def test_a_killed_program_leaves_a_stream_of_all_frames_but_the_last(tmp_path: P
             time.sleep(0.02)
         assert program.poll() is None
         program.send_signal(signal.SIGKILL)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")  # as for a file that was cut off
+    with warnings.catch_warnings(action="error"):  # as for a file that was cut off
         assert len(fba.read(path)) == count - 1
 
 
@@ -131,8 +129,7 @@ def test_a_pipe_names_the_steps_before_a_body_and_a_file_does_not(tmp_path: Path
     file = (tmp_path / "live.fba").read_bytes()
     assert target.getvalue() == write_opening("visage") + file
     decoder, data = fba.Decoder(), target.getvalue()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         frames = [f for at in range(0, len(data), size) for f in decoder.push(data[at : at + size])]
         frames += decoder.finish()
     assert [int(frame.body.values[0, 31]) for frame in frames if frame.body is not None] == [170] * 4

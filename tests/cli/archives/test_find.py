@@ -50,8 +50,7 @@ def test_a_picture_is_found(run: Run, made: Path) -> None:
     assert "from another side: raising.fba, frame" in out
     assert len(out.splitlines()) == 6  # a head and three rows
     (report,) = json.loads(run("find", made / "5.png", made / "index.npz", "--json").out)
-    assert report["found"]["side"] == "front"
-    assert len(report["nearest"]) == 10
+    assert (report["found"]["side"], len(report["nearest"])) == ("front", 10)
     assert abs(report["other_side"]["yaw"]) >= 60
 
 

@@ -14,7 +14,7 @@ from fba.face.fitting import FRONT_POINTS, _skin, write_photo_points
 from fba.face.fitting._views import View
 from fba.mesh import read_pixels
 from fba.parameters import point_rows
-from fba_player.scene._photo_editing import PhotoEditing
+from fba_player.scene._photo_scene import PhotoEditing
 from fba_player.window import pages
 
 
@@ -39,8 +39,7 @@ def test_a_head_is_made_and_measured(run: Run, photo: Path) -> None:
     pupils = head.points[[point_rows()["3.5"], point_rows()["3.6"]]]
     assert np.linalg.norm(pupils[0] - pupils[1]) == pytest.approx(0.065, abs=0.0005)
     assert "front ada.png: 40 points, 0.0 mm off on average; camera 0 degrees" in out
-    assert out.count("    profile ") == 6
-    assert out.count("    front ") == 8
+    assert (out.count("    profile "), out.count("    front ")) == (6, 8)
     out = run("model", "photos", photo, "-o", out_file, "--points", points, "--json").out
     assert len(json.loads(out)["measures"]) == 14
 

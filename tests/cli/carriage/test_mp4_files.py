@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import wave
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -21,6 +20,7 @@ from fba.codec import encode_animation, marked_table
 from fba_player.sound.coded_sound import read_coded_sound
 from joinable_streams import JOINABLE, performance
 from mp4_files import Track, whole_file
+from sound_clicks import write_wave
 
 RATE = 16_000
 SECONDS = 3
@@ -35,11 +35,7 @@ def stream(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def voice(tmp_path: Path) -> Path:
-    path = tmp_path / "voice.wav"
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, RATE, 0, "NONE", ""))
-        file.writeframes((12_000 * tone()).astype("<i2").tobytes())
-    return path
+    return write_wave(tmp_path / "voice.wav", 12_000 * tone(), RATE)
 
 
 def tone() -> Float64:

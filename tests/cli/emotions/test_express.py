@@ -146,8 +146,7 @@ def test_json_and_csv_say_the_same(run: Run, angry: Path, tmp_path: Path) -> Non
     report = json.loads(run("emotion", angry, "--json").out)
     assert report["main"] == "anger"
     middle = report["frames"][25]
-    assert middle["label"] == "anger"
-    assert middle["nearest"][0]["name"] == "rage"
+    assert (middle["label"], middle["nearest"][0]["name"]) == ("anger", "rage")
     assert 60 <= middle["nearest"][0]["intensity"] <= 100
     assert 4 < middle["activation"] < 4.5
     run("emotion", angry, "-o", tmp_path / "out.csv")

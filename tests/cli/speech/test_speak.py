@@ -17,7 +17,7 @@ import pytest
 import fba
 from command_line import Run
 from fba.face import resolve
-from sound_clicks import babble
+from sound_clicks import babble, write_wave
 
 CTM = "map 1 0.00 0.10 M\nmap 1 0.10 0.30 AE\nmap 1 0.40 0.10 P\n"
 needs_voice = pytest.mark.skipif(
@@ -33,15 +33,6 @@ needs_recogniser = pytest.mark.skipif(
 def timings(tmp_path: Path) -> Path:
     path = tmp_path / "map.ctm"
     path.write_text(CTM, encoding="utf-8")
-    return path
-
-
-def write_wave(path: Path, samples: Any, rate: int = 16000, channels: int = 1, width: int = 2) -> Path:
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(channels)
-        file.setsampwidth(width)
-        file.setframerate(rate)
-        file.writeframes(samples if isinstance(samples, bytes) else np.asarray(samples, "<i2").tobytes())
     return path
 
 

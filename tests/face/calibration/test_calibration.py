@@ -323,10 +323,8 @@ def test_noise_never_crashes(small: FaceModel, seed: int) -> None:
     rng = np.random.default_rng(seed)
     given = person(small, seed) + rng.normal(scale=10.0 ** rng.uniform(-4, 0), size=(84, 3))
     given[rng.random(84) < rng.uniform(0, 0.9)] = np.nan
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
-        with contextlib.suppress(ModelError):
-            assert np.isfinite(fit(small, given).vertices).all()
+    with warnings.catch_warnings(action="ignore", category=FbaWarning), contextlib.suppress(ModelError):
+        assert np.isfinite(fit(small, given).vertices).all()
 
 
 def test_unknown_options(small: FaceModel) -> None:
@@ -363,8 +361,7 @@ def test_the_real_files(head: FaceModel, shared: Path) -> None:
     """Candide's points, with all their mistakes, make a face; each mistake is told."""
     from fba.face.importers.points.fdp import read_fdp_points
 
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as told:
         given = read_fdp_points(shared / "data/candide/candide3.fdp")
         fitted = fit(head, given, tables="carry")
     text = " ".join(str(one.message) for one in told)
@@ -447,8 +444,7 @@ def test_missing_points_of_the_model_stay_missing(small: FaceModel) -> None:
 def test_names_and_notes_are_kept(small: FaceModel) -> None:
     noted = replace(small, notes={"licence": "CC0"}, name="small")
     fitted = fit(noted, small.points * 1000)
-    assert fitted.name == "small"
-    assert fitted.notes["licence"] == "CC0"
+    assert (fitted.name, fitted.notes["licence"]) == ("small", "CC0")
     assert "84 feature points" in fitted.notes["fitted"]
     assert fit(noted, small.points, name="Ada").name == "Ada"
     assert len(names()) == 84

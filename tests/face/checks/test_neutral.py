@@ -243,7 +243,6 @@ def test_the_sphere_is_found_under_a_cornea_and_a_flat_iris() -> None:
     front = vertices[:, 2] > centre[2] + 0.9 * radius
     vertices[front, 2] += 0.001
     fitted = sphere(Part("eye", "eye", vertices, triangles))
-    assert fitted is not None
     np.testing.assert_allclose(fitted[0], centre, atol=2e-6)
     assert fitted[1] == pytest.approx(radius, abs=2e-6)
     assert fitted[2] < 1e-6

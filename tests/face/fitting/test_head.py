@@ -76,7 +76,6 @@ def colour_at(made: Made, name: str) -> np.ndarray:
     """The mean colour of the skin around a feature point."""
     part = made.head.model.part("skin")
     vertex = int(made.head.model.bound[point_rows()[name]]) - made.head.model.starts["skin"]
-    assert part.texcoords is not None
     x, y = (part.texcoords[vertex] * 512).astype(int)
     return np.asarray(made.pixels[y - 3 : y + 4, x - 3 : x + 4, :3].reshape(-1, 3).mean(axis=0))
 

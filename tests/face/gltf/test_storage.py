@@ -62,11 +62,9 @@ def test_a_viewer_shows_the_neutral_face(tmp_path: Path) -> None:
         assert np.array_equal(surface.triangles, part.triangles)
         assert surface.normals is not None
         assert surface.normals == pytest.approx(part.normals, abs=1e-6)
-        assert surface.material is not None
         assert surface.material.texture == part.material.texture
     skin, eye = shown["skin"], shown["left eye"]
     assert np.array_equal(skin.colours, model.parts[0].colours)
-    assert skin.material is not None
     # viewers multiply colours of vertices and materials; here the former replace the latter
     assert (skin.material.colour, skin.material.roughness) == ((1, 1, 1, 1), 0.5)
     assert np.array_equal(eye.texcoords, model.parts[1].texcoords)
@@ -203,7 +201,6 @@ def test_normals_are_made_unit() -> None:
     slack = part.normals * np.float32(1.00001)
     normals = np.array([[0, 0, 2], [0, 0, 0], *slack[2:]], dtype=np.float32)
     found = replace(part, normals=normals).normals
-    assert found is not None
     assert found[:2].tolist() == [[0, 0, 1], [0, 0, 1]]
     assert np.array_equal(found[2:], slack[2:])  # as good as unit: not a bit is changed
 

@@ -119,12 +119,6 @@ def test_lips_meet_where_the_skin_ends() -> None:
     assert mouth_points(part, drop, lips[0] + (0, 0.04, 0), lips[1] + (0, 0.04, 0), 0.06) == {}
 
 
-@pytest.fixture(scope="module")
-def base() -> FaceModel:
-    head = small_head(cell=0.006)
-    return author(head.parts, head.points, bound=head.bound)
-
-
 def shape_of(model: FaceModel, faps: dict[str, float]) -> dict[str, np.ndarray]:
     values = np.zeros(68)
     for name, value in faps.items():

@@ -16,7 +16,6 @@ from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.model import FaceModel
 from fba.parameters import fap_numbers, faps, point_rows
 from mesh_files import write_glb, write_points
-from small_head import small_head
 
 BROW = ("raise_l_i_eyebrow", "raise_l_m_eyebrow", "raise_l_o_eyebrow")
 HEIGHT = 200
@@ -41,12 +40,6 @@ def shapes_of(model: FaceModel, **poses: np.ndarray) -> dict[str, dict[str, np.n
     deform = Deformer(model)
     rest = deform.local(np.zeros(68))
     return {name: by_part(model, deform.local(values) - rest) for name, values in poses.items()}
-
-
-@pytest.fixture(scope="module")
-def base() -> FaceModel:
-    head = small_head(cell=0.006)
-    return author(head.parts, head.points, bound=head.bound)
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 import copy
 import json
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from hypothesis import strategies as st
 
 from fba.errors import ModelError
 from fba.face.interpolation._evaluate import evaluate
-from fba.face.interpolation._terms import Function, Link, Term
+from fba.face.interpolation._node import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.parameters import fap_numbers, faps
 
@@ -37,26 +36,14 @@ def worked_example() -> InterpolationTable:
             ]
         )
 
+    jaw, upper, lower = names = ("open_jaw", "lower_t_midlip", "raise_b_midlip")
+    corner = Function(
+        [Term(1, {jaw: 1}), Term(2, {upper: 1}), Term(3, {lower: 1}), Term(4, {upper: 1, lower: 2})],
+        [Term(5, {lower: 1}), Term(6, {jaw: 1, upper: 1, lower: 1})],
+    )
     return InterpolationTable(
         [
-            Link(
-                ("open_jaw", "lower_t_midlip", "raise_b_midlip"),
-                {
-                    "stretch_l_cornerlip": Function(
-                        [
-                            Term(1, {"open_jaw": 1}),
-                            Term(2, {"lower_t_midlip": 1}),
-                            Term(3, {"raise_b_midlip": 1}),
-                            Term(4, {"lower_t_midlip": 1, "raise_b_midlip": 2}),
-                        ],
-                        [
-                            Term(5, {"raise_b_midlip": 1}),
-                            Term(6, {"open_jaw": 1, "lower_t_midlip": 1, "raise_b_midlip": 1}),
-                        ],
-                    ),
-                    "stretch_r_cornerlip": one("lower_t_midlip"),
-                },
-            ),
+            Link(names, {"stretch_l_cornerlip": corner, "stretch_r_cornerlip": one(upper)}),
             Link(("expression",), {"raise_l_cornerlip": surprise(0.6), "push_t_lip": surprise(-1.5)}),
         ]
     )
@@ -119,21 +106,8 @@ def test_impulses_select_the_expression(expression: tuple[int, ...], amount: int
 
 
 def test_impulses_select_the_viseme() -> None:
-    table = InterpolationTable(
-        [
-            Link(
-                ("viseme", "open_jaw"),
-                {
-                    "push_b_lip": Function(
-                        [
-                            Term(2, {"viseme_blend": 1, "open_jaw": 1}, ("viseme_select1", 14)),
-                            Term(1),
-                        ]
-                    )
-                },
-            )
-        ]
-    )
+    terms = [Term(2, {"viseme_blend": 1, "open_jaw": 1}, ("viseme_select1", 14)), Term(1)]
+    table = InterpolationTable([Link(("viseme", "open_jaw"), {"push_b_lip": Function(terms)})])
     assert values_of(table, {"open_jaw": 10}, viseme=(14, 0, 63, 0)) == {"push_b_lip": 2 * 63 * 10 + 1}
     assert values_of(table, {"open_jaw": 10}, viseme=(13, 14, 63, 0)) == {"push_b_lip": 1}
     assert values_of(table, {"open_jaw": 10}) == {}  # no viseme in force
@@ -355,10 +329,16 @@ def test_bad_nodes_are_refused(change: dict[str, list[Any]], message: str) -> No
         InterpolationTable.from_node({**NODE, **change})
 
 
-def _spoil(change: Callable[[Any], None]) -> Any:
+def _with_terms(numerator: list[Any]) -> Any:
+    """The worked example with other terms for the upper lip."""
     data = copy.deepcopy(worked_example().to_dict())
-    change(data)
+    data["links"][1]["destination"]["push_t_lip"]["numerator"] = numerator
     return data
+
+
+def _with_term(**changes: Any) -> Any:
+    terms = worked_example().to_dict()["links"][1]["destination"]["push_t_lip"]["numerator"]
+    return _with_terms([{**terms[0], **changes}, *terms[1:]])
 
 
 @pytest.mark.parametrize(
@@ -371,46 +351,13 @@ def _spoil(change: Callable[[Any], None]) -> Any:
         ({"links": [{"source": "viseme", "destination": {}}]}, "link 1 of the FIT: source must be a list"),
         ({"links": [{"source": [3], "destination": {}}]}, "list of names"),
         ({"links": [{"source": ["open_jaw"], "destination": []}]}, "destination must be an object"),
-        (
-            _spoil(lambda d: d["links"][1]["destination"]["push_t_lip"].update(numerator=[5])),
-            "term 1 must be",
-        ),
-        (
-            _spoil(lambda d: d["links"][1]["destination"]["push_t_lip"].update(numerator=[{}])),
-            "term 1 has no coefficient",
-        ),
-        (
-            _spoil(
-                lambda d: d["links"][1]["destination"]["push_t_lip"].update(numerator=[{"coefficient": "1"}])
-            ),
-            "not a finite number",
-        ),
-        (
-            _spoil(
-                lambda d: d["links"][1]["destination"]["push_t_lip"].update(numerator=[{"coefficient": True}])
-            ),
-            "not a finite number",
-        ),
-        (
-            _spoil(lambda d: d["links"][1]["destination"]["push_t_lip"]["numerator"][0].update(when={})),
-            None,
-        ),
-        (
-            _spoil(
-                lambda d: d["links"][1]["destination"]["push_t_lip"]["numerator"][0].update(
-                    when={"expression_select1": 1, "expression_select2": 1}
-                )
-            ),
-            "when must name one select",
-        ),
-        (
-            _spoil(
-                lambda d: d["links"][1]["destination"]["push_t_lip"]["numerator"][0].update(
-                    powers={"expression_intensity1": 1.5}
-                )
-            ),
-            "whole number",
-        ),
+        (_with_terms([5]), "term 1 must be"),
+        (_with_terms([{}]), "term 1 has no coefficient"),
+        (_with_terms([{"coefficient": "1"}]), "not a finite number"),
+        (_with_terms([{"coefficient": True}]), "not a finite number"),
+        (_with_term(when={}), None),
+        (_with_term(when={"expression_select1": 1, "expression_select2": 1}), "when must name one select"),
+        (_with_term(powers={"expression_intensity1": 1.5}), "whole number"),
     ],
 )
 def test_bad_json_is_refused(data: object, message: str | None) -> None:

@@ -11,7 +11,7 @@ from fba.errors import FbaError, ModelError
 from fba.face import FaceModel, InterpolationTable, resolve
 from fba.face.deform._deformer import Deformer
 from fba.face.deform.displacements import vertex_distances
-from fba.face.interpolation._terms import TERMS_MAX, Function, Link, Term
+from fba.face.interpolation._node import TERMS_MAX, Function, Link, Term
 from fba.face.learning import learn_fit, send_sources
 from fba.face.learning._regression import fit_coefficients, make_table, measure
 from fba.parameters import fap_numbers, faps

@@ -41,13 +41,10 @@ def text(head: str = HEAD, rows: str = ROWS, frames: str = "2", time: str = "0.0
 
 def test_reads_hierarchy_and_motion() -> None:
     motion = reader.parse(text(), name="small")
-    assert motion.names == ("Hips", "Spine")
-    assert motion.parents.tolist() == [-1, 0]
-    assert motion.offsets.tolist() == [[0, 0, 0], [0, 10, 0]]
-    assert motion.end_parents.tolist() == [1]
+    assert (motion.names, motion.parents.tolist()) == (("Hips", "Spine"), [-1, 0])
+    assert (motion.offsets.tolist(), motion.end_parents.tolist()) == ([[0, 0, 0], [0, 10, 0]], [1])
     assert motion.end_offsets.tolist() == [[0, 5, 1]]
-    assert motion.positions.tolist() == [[1, 2, 3], [0, 0, 0]]
-    assert motion.rate == 25
+    assert (motion.positions.tolist(), motion.rate) == ([[1, 2, 3], [0, 0, 0]], 25)
     assert motion.name == "small"
     for joint, order, angles in ((0, "ZXY", [10, 20, 30]), (1, "YZX", [40, 50, 60])):
         w, *xyz = motion.rotations[0, joint]
@@ -234,8 +231,7 @@ def test_real_files_read_quickly_and_whole(shared: Path) -> None:
     start = time.process_time()
     motion = reader.read_motion(path)
     assert time.process_time() - start < 30  # about 0.1 s of one core; a guard against losing orders
-    assert len(motion) == 961
-    assert motion.names[:3] == ("Hips", "Chest", "Chest2")
+    assert (len(motion), motion.names[:3]) == (961, ("Hips", "Chest", "Chest2"))
     np.testing.assert_allclose(motion.positions[0], [-51.207945, 97.094741, -70.474226])
 
 

@@ -42,8 +42,7 @@ def test_tags_stay_in_force_until_changed(tmp_path: Path) -> None:
     first, second, third, fourth = read_epf(path)
     assert [plane.intra for plane in (first, second, third, fourth)] == [True, False, False, True]
     assert [plane.face_frame for plane in (first, second, third, fourth)] == [0, 2, 9, 10]
-    assert first.body is None
-    assert first.body_frame is None
+    assert (first.body, first.body_frame) == (None, None)
     assert first.frame_rate == FrameRate(29, 5, 1)
     assert first.time_code == TimeCode(1, 2, 3, marker=0)
     assert [first.skip, second.skip, third.skip, fourth.skip] == [17, 0, 1, 0]
@@ -71,8 +70,7 @@ def test_body_masks_follow_the_listed_order_of_the_groups(tmp_path: Path) -> Non
         tmp_path, "a.epf", "FBM 2", "BFR 5", "ISI 1", "BRR 25 0 0", f"BMT {' '.join(groups)}", "BQU 1"
     )
     (plane,) = read_epf(path)
-    assert plane.body_frame == 5
-    assert plane.face is None
+    assert (plane.body_frame, plane.face) == (5, None)
     assert (np.flatnonzero(plane.body.mask) + 1).tolist() == [32, 42, *range(181, 187)]
 
 

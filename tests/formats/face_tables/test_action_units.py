@@ -9,7 +9,7 @@ import fba
 from fba import rotations
 from fba.arrays import Float64
 from fba.capture import ActionUnitMotion, from_action_units, shape_faps
-from fba.capture.blendshapes.action_units import unit_shapes
+from fba.capture.blendshapes.conversion import unit_shapes
 from fba.errors import FbaWarning, FormatError, ModelError
 from fba.face import arkit_names
 from fba.formats import format_of

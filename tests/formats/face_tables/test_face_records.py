@@ -12,7 +12,7 @@ import pytest
 
 import fba
 from fba.capture import ShapeMotion
-from fba.capture.points.poses import fit_poses
+from fba.capture.points.picture import fit_poses
 from fba.errors import FbaWarning, FormatError, ModelError, UnsupportedError
 from fba.formats import format_of
 from fba.formats.face_tables import _livelink_csv as tables

@@ -232,8 +232,7 @@ def test_the_samples_of_others(shared: Path) -> None:
     motion = pyfeat.read_face(folder / "pyfeat_news003.csv")
     assert isinstance(motion, ShapeMotion)
     assert (len(motion), motion.rate, len(motion.names)) == (24, 12, 51)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         face = fba.read(folder / "pyfeat_news003.csv").face
     moved = face.values[:, [fap_numbers()[name] - 1 for name in ("head_pitch", "head_yaw", "head_roll")]]
     assert (np.ptp(moved, axis=0) > 2000).all()

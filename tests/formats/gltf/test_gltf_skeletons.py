@@ -204,8 +204,7 @@ def test_joints_that_stand_off_their_bind_pose_by_a_hundredth(
         node["translation"] = [number * (1 + off / length) for number in node["translation"]]
 
     path = changed(tmp_path, change)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         read_motion(path)
     assert any("keep that of the bind pose: LeftHand" in str(w.message) for w in caught) == warned
 

@@ -26,8 +26,7 @@ def test_reads_values_masks_and_numbers(tmp_path: Path) -> None:
         "4 1 2 63 1 5 62 6 61 0 1 -7 99  # tail", mask(3), "5\t-0", mask(), "9",
     )  # fmt: skip
     animation = read_fap(path)
-    assert animation.name == "a name with blanks"
-    assert animation.rate == 25
+    assert (animation.name, animation.rate) == ("a name with blanks", 25)
     assert animation.index.tolist() == [4, 5, 9]
     face = animation.face
     assert face.viseme.tolist() == [[1, 2, 63, 1], [0] * 4, [0] * 4]
@@ -41,8 +40,7 @@ def test_line_ends_byte_order_mark_and_old_encodings(tmp_path: Path, end: bytes)
     name = "Gähnen".encode("latin-1")
     path = file(tmp_path, "a.fap", b"\xef\xbb\xbf2.0 " + name + b" 30 1", mask(5), "0 12", end=end)
     animation = read_fap(path)
-    assert animation.name == "Gähnen"
-    assert animation.face.values[0, 4] == 12
+    assert (animation.name, animation.face.values[0, 4]) == ("Gähnen", 12)
 
 
 def test_windows_path_as_a_name_and_a_69th_column(tmp_path: Path) -> None:
@@ -50,8 +48,7 @@ def test_windows_path_as_a_name_and_a_69th_column(tmp_path: Path) -> None:
         tmp_path, "a.fap", r"2.1 C:\My Files\x 25 2", mask(19, width=69), "0 940", mask(69, width=69), "1 5"
     )
     animation = read_fap(path)
-    assert animation.name == r"C:\My Files\x"
-    assert animation.face.values[:, 18].tolist() == [940, 0]
+    assert (animation.name, animation.face.values[:, 18].tolist()) == (r"C:\My Files\x", [940, 0])
     assert not animation.face.mask[1].any()
 
 
@@ -225,8 +222,7 @@ def test_every_real_file_reads_and_writes_back(shared: Path, tmp_path: Path) -> 
     assert len(paths) >= 190
     for path in paths:
         options = {"source_rate": 25} if path.parent.name == "semaine" else {}
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # none of them has an oddity worth a warning
+        with warnings.catch_warnings(action="error"):  # none of them has an oddity worth a warning
             animation = read_fap(path, **options)  # type: ignore[arg-type]
         assert len(animation)
         write_fap(tmp_path / "b.fap", animation)
@@ -253,8 +249,7 @@ def test_a_face_is_not_written_as_a_body(tmp_path: Path) -> None:
 def test_both_widths_and_one_column_more(tmp_path: Path, width: int) -> None:
     path = file(tmp_path, "a.bap", "3.2 walk 30 1", mask(1, 186, width=width), "3 -5 6")
     animation = read_bap(path)
-    assert animation.index.tolist() == [3]
-    assert animation.body.values[0, [0, 185]].tolist() == [-5, 6]
+    assert (animation.index.tolist(), animation.body.values[0, [0, 185]].tolist()) == ([3], [-5, 6])
     assert animation.body.mask.sum() == 2
     write_bap(tmp_path / "b.bap", animation)
     assert (tmp_path / "b.bap").read_text() == f"3.2 walk 30 1\n{mask(1, 186, width=296)}\n3 -5 6\n"
@@ -298,8 +293,7 @@ def test_every_real_bap_file_reads_and_writes_back(shared: Path, tmp_path: Path)
     paths = [path for path in shared.rglob("*") if path.suffix.lower() == ".bap"]
     assert len(paths) >= 100
     for path in paths:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", FbaWarning)
+        with warnings.catch_warnings(action="error", category=FbaWarning):
             animation = read_bap(path)
         write_bap(tmp_path / "b.bap", animation)
         assert read_bap(tmp_path / "b.bap") == animation
@@ -307,6 +301,5 @@ def test_every_real_bap_file_reads_and_writes_back(shared: Path, tmp_path: Path)
 
 def test_known_numbers_of_a_real_file(shared: Path) -> None:
     body = read_bap(shared / "data" / "vreng" / "clap.bap").body
-    assert len(body) == 59
-    assert body.values[0][body.mask[0]].tolist() == [-8726, -8726, 8726, 8726]
+    assert (len(body), body.values[0][body.mask[0]].tolist()) == (59, [-8726, -8726, 8726, 8726])
     assert body.values[58][body.mask[58]].tolist() == [49109, -36678, 164853, -131197, 23565, 28441]

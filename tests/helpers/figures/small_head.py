@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import Delaunay
 
+from fba.face.authoring import author
 from fba.face.feature_points import MIRRORED
 from fba.face.model import FaceModel, Part
 from fba.parameters import point_rows
@@ -59,6 +60,13 @@ def small_head(points: np.ndarray | None = None, cell: float = 0.006) -> FaceMod
         bound[row[name]] = at + nearest
     parts[-1] = Part("tongue", "tongue", tongue, sides)
     return FaceModel(parts=tuple(parts), points=points, bound=bound, name="small head")
+
+
+@cache
+def authored_head(cell: float = 0.006) -> FaceModel:
+    """A small head with tables that `author` made."""
+    head = small_head(cell=cell)
+    return author(head.parts, head.points, bound=head.bound)
 
 
 def ball(centre: np.ndarray, radius: float, rings: int = 12) -> tuple[np.ndarray, np.ndarray]:

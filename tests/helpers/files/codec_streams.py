@@ -34,12 +34,19 @@ def packed(bits: str) -> bytes:
     return int("1" + bits, 2).to_bytes(len(bits) // 8 + 1, "big")[1:]
 
 
-def fap_masks(*sent: int) -> str:
-    """Masks of the 10 FAP groups, type 1 where something is sent."""
+def flipped(data: bytes, bit: int) -> bytes:
+    """The stream with one bit changed."""
+    changed = bytearray(data)
+    changed[bit >> 3] ^= 128 >> (bit & 7)
+    return bytes(changed)
+
+
+def fap_masks(*sent: int, mask_type: int = 1) -> str:
+    """Masks of the 10 FAP groups: of this type where something is sent, else of type 0."""
     bits, first = "", 1
     for size in FAP_GROUP_SIZES:
         flags = "".join("1" if first + i in sent else "0" for i in range(size))
-        bits += f"101{flags}" if "1" in flags else "100"
+        bits += f"1{mask_type:02b}{flags}" if "1" in flags else "100"
         first += size
     return bits
 
@@ -73,8 +80,7 @@ def decoded(
     """All frames that come out, what was raised, and the decoder."""
     decoder = Decoder(on_error=mode, bap_steps=bap_steps)  # type: ignore[arg-type]
     frames: list[Frame] = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FbaWarning)
+    with warnings.catch_warnings(action="ignore", category=FbaWarning):
         try:
             for start in range(0, len(data), chunk or len(data) or 1):
                 frames += decoder.push(data[start : start + (chunk or len(data))])

@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -330,7 +331,30 @@ def planes(size: int) -> bytes:
     return (EPF_PLANE + "SKN 1000000\n" + "FBM 1\nFFR 0\nISI 0\nSKN 1000000\n" * (size // 32)).encode()
 
 
+def read_markers(path: Path) -> object:
+    """Read a capture of markers."""
+    return format_of(path).read_face(path, source_rate=Fraction(50))
+
+
 FAP = FAP_HEAD + mask(3) + "\n0 1\n"
+
+
+bvh_file = partial(HostileFile, read_motion, "a.bvh")
+glb_file = partial(HostileFile, read_motion, "a.glb")
+markers_csv = partial(HostileFile, read_markers, "a.csv")
+fap_file = partial(HostileFile, fba.read, "a.fap")
+glb_head = partial(HostileFile, gltf_pieces, "a.glb")
+gltf_head = partial(HostileFile, gltf_pieces, "a.gltf")
+face_csv = partial(HostileFile, fba.read, "a.csv")
+mp4_file = partial(HostileFile, fba.read, "a.mp4")
+fdp_file = partial(HostileFile, read_points, "a.fdp")
+points_json = partial(HostileFile, read_points, "a.json")
+body_json = partial(HostileFile, BodyDefinition.load, "a.json")
+obj_pieces = partial(HostileFile, read_pieces, "a.obj")
+vrml_file = partial(HostileFile, read_vrml, "a.wrl")
+obj_file = partial(HostileFile, read_obj, "a.obj")
+trc_file = partial(HostileFile, read_markers, "a.trc")
+ply_file = partial(HostileFile, read_ply, "a.ply")
 
 
 def hostile_files() -> dict[str, HostileFile]:
@@ -351,14 +375,14 @@ def hostile_files() -> dict[str, HostileFile]:
 
 def _texts() -> dict[str, HostileFile]:
     return {
-        "fap words": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD + mask(3) + "\n0 ", "1 ")),
-        "fap masks": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, mask(3) + "\n%d 1\n")),
-        "fap blanks": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, "\n")),
-        "fap comments": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, "#\n")),
-        "fap returns": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, "\r")),
-        "fap backwards": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, mask() + "\n0\n")),
-        "fap name": HostileFile(fba.read, "a.fap", repeat("2.1 ", "a ", "25 1\n", most=30_000)),
-        "fap empty masks": HostileFile(fba.read, "a.fap", repeat(FAP_HEAD, mask() + "\n%d\n")),
+        "fap words": fap_file(repeat(FAP_HEAD + mask(3) + "\n0 ", "1 ")),
+        "fap masks": fap_file(repeat(FAP_HEAD, mask(3) + "\n%d 1\n")),
+        "fap blanks": fap_file(repeat(FAP_HEAD, "\n")),
+        "fap comments": fap_file(repeat(FAP_HEAD, "#\n")),
+        "fap returns": fap_file(repeat(FAP_HEAD, "\r")),
+        "fap backwards": fap_file(repeat(FAP_HEAD, mask() + "\n0\n")),
+        "fap name": fap_file(repeat("2.1 ", "a ", "25 1\n", most=30_000)),
+        "fap empty masks": fap_file(repeat(FAP_HEAD, mask() + "\n%d\n")),
         "bap masks": HostileFile(fba.read, "a.bap", repeat("3.1 a 25 1\n", mask(width=186) + "\n%d\n")),
         "epf planes": HostileFile(read_epf, "a.epf", repeat(EPF_PLANE, "FBM 1\nFFR 1\n")),
         "epf I planes": HostileFile(read_epf, "a.epf", repeat("", EPF_PLANE)),
@@ -374,33 +398,27 @@ def _captures() -> dict[str, HostileFile]:
     ends = bvh(ends="|", motion=motion).split("|")
     names = bvh(joints="JOINT |" + joint, motion=motion).split("|")
     return {
-        "bvh nested": HostileFile(read_motion, "a.bvh", nested_joints),
+        "bvh nested": bvh_file(nested_joints),
         "bvh capture": HostileFile(encode_capture, "a.bvh", capture),
-        "bvh spaces": HostileFile(read_motion, "a.bvh", repeat(bvh() + "Frames", " ", "x\n")),
-        "bvh short lines": HostileFile(read_motion, "a.bvh", repeat(bvh(channels=1) + FRAMES, "11\n")),
+        "bvh spaces": bvh_file(repeat(bvh() + "Frames", " ", "x\n")),
+        "bvh short lines": bvh_file(repeat(bvh(channels=1) + FRAMES, "11\n")),
         "bvh frames": HostileFile(fba.read, "a.bvh", repeat(bvh(channels=1) + FRAMES, "1\n", most=10_000)),
-        "bvh one line": HostileFile(read_motion, "a.bvh", repeat(bvh() + FRAMES, "1 ")),
-        "bvh blank lines": HostileFile(read_motion, "a.bvh", repeat(bvh() + motion, "\n")),
-        "bvh braces": HostileFile(read_motion, "a.bvh", repeat(start, "{")),
-        "bvh name": HostileFile(read_motion, "a.bvh", repeat("HIERARCHY\nROOT ", "a ", "{ OFFSET 0 0 0 }\n")),
-        "bvh prefixes of a name": HostileFile(read_motion, "a.bvh", repeat(names[0], "a_", names[1])),
-        "bvh shared prefixes": HostileFile(read_motion, "a.bvh", prefixes),
-        "bvh ends": HostileFile(
-            read_motion, "a.bvh", repeat(ends[0], "End Site { OFFSET 0 1 0 }\n", ends[1])
-        ),
-        "bvh end words": HostileFile(read_motion, "a.bvh", repeat(start + "{\n", "END ")),
-        "bvh joint words": HostileFile(read_motion, "a.bvh", repeat(start + "{\n", "JOINT ")),
-        "gltf nodes": HostileFile(read_motion, "a.glb", lambda size: skeleton(nodes=size // 44)),
-        "gltf nested": HostileFile(
-            read_motion, "a.glb", lambda size: skeleton(nodes=size // 60, nested=True)
-        ),
-        "gltf one name": HostileFile(
-            read_motion, "a.glb", lambda size: skeleton(nodes=size // 44, name="Hips")
-        ),
-        "gltf skin": HostileFile(read_motion, "a.glb", lambda size: skeleton(nodes=size // 52, skin=True)),
-        "gltf channels": HostileFile(read_motion, "a.glb", lambda size: skeleton(channels=size // 64)),
-        "gltf clips": HostileFile(read_motion, "a.glb", lambda size: skeleton(clips=size // 120)),
-        "gltf roots": HostileFile(read_motion, "a.glb", lambda size: skeleton(roots=size // 24)),
+        "bvh one line": bvh_file(repeat(bvh() + FRAMES, "1 ")),
+        "bvh blank lines": bvh_file(repeat(bvh() + motion, "\n")),
+        "bvh braces": bvh_file(repeat(start, "{")),
+        "bvh name": bvh_file(repeat("HIERARCHY\nROOT ", "a ", "{ OFFSET 0 0 0 }\n")),
+        "bvh prefixes of a name": bvh_file(repeat(names[0], "a_", names[1])),
+        "bvh shared prefixes": bvh_file(prefixes),
+        "bvh ends": bvh_file(repeat(ends[0], "End Site { OFFSET 0 1 0 }\n", ends[1])),
+        "bvh end words": bvh_file(repeat(start + "{\n", "END ")),
+        "bvh joint words": bvh_file(repeat(start + "{\n", "JOINT ")),
+        "gltf nodes": glb_file(lambda size: skeleton(nodes=size // 44)),
+        "gltf nested": glb_file(lambda size: skeleton(nodes=size // 60, nested=True)),
+        "gltf one name": glb_file(lambda size: skeleton(nodes=size // 44, name="Hips")),
+        "gltf skin": glb_file(lambda size: skeleton(nodes=size // 52, skin=True)),
+        "gltf channels": glb_file(lambda size: skeleton(channels=size // 64)),
+        "gltf clips": glb_file(lambda size: skeleton(clips=size // 120)),
+        "gltf roots": glb_file(lambda size: skeleton(roots=size // 24)),
         "gltf hours": HostileFile(fba.read, "a.glb", lambda size: skeleton(last=16_000.0)),
     }
 
@@ -439,19 +457,12 @@ def _faces() -> dict[str, HostileFile]:
             encode_capture, "a.json", repeat(NAMES + "0", ',{"t":%d,"jawOpen":0}', "]")
         ),
         "table of a face": HostileFile(encode_capture, "a.csv", rows),
-        "table, short rows": HostileFile(fba.read, "a.csv", repeat(few + "\n", "0:0:0:%d" + ",0" * 7 + "\n")),
-        "table, names": HostileFile(fba.read, "a.csv", repeat(few, ",a", "\n" + table)),
-        "table, blank lines": HostileFile(fba.read, "a.csv", repeat(table, "\n")),
-        "table, one line": HostileFile(fba.read, "a.csv", repeat(table, "1,")),
-        "table, empty cells": HostileFile(
-            fba.read, "a.csv", repeat(head + "\n", "0:0:0:1" + "," * 53 + "\n")
-        ),
+        "table, short rows": face_csv(repeat(few + "\n", "0:0:0:%d" + ",0" * 7 + "\n")),
+        "table, names": face_csv(repeat(few, ",a", "\n" + table)),
+        "table, blank lines": face_csv(repeat(table, "\n")),
+        "table, one line": face_csv(repeat(table, "1,")),
+        "table, empty cells": face_csv(repeat(head + "\n", "0:0:0:1" + "," * 53 + "\n")),
     }
-
-
-def read_markers(path: Path) -> object:
-    """Read a capture of markers."""
-    return format_of(path).read_face(path, source_rate=Fraction(50))
 
 
 def _markers() -> dict[str, HostileFile]:
@@ -469,47 +480,35 @@ def _markers() -> dict[str, HostileFile]:
     return {
         "c3d frames": HostileFile(read_markers, "a.c3d", lambda size: c3d(take(10, size // 160))),
         "c3d markers": HostileFile(read_markers, "a.c3d", lambda size: c3d(take(min(size // 30, 1000), 1))),
-        "trc rows": HostileFile(read_markers, "a.trc", repeat(trc_head + "\n", "%d\t\t1\t2\t3\n")),
-        "trc names": HostileFile(read_markers, "a.trc", repeat(trc_head[:-8], "\tA", "\n1\t0\n")),
-        "trc keys": HostileFile(
-            read_markers, "a.trc", repeat("PathFileType\n", "a ", "\nFrame#\tTime\tA\n1\t0\t1")
-        ),
-        "motive columns": HostileFile(
-            read_markers, "a.csv", repeat(motive + ",Type", ",Marker", "\nFrame,X\n")
-        ),
-        "motive quotes": HostileFile(read_markers, "a.csv", repeat(motive, '"')),
-        "nexus rows": HostileFile(read_markers, "a.csv", repeat(nexus, "%d,0,1,2,3\n")),
-        "nexus sections": HostileFile(read_markers, "a.csv", repeat(nexus[:-20], "Devices\n1\n\n")),
+        "trc rows": trc_file(repeat(trc_head + "\n", "%d\t\t1\t2\t3\n")),
+        "trc names": trc_file(repeat(trc_head[:-8], "\tA", "\n1\t0\n")),
+        "trc keys": trc_file(repeat("PathFileType\n", "a ", "\nFrame#\tTime\tA\n1\t0\t1")),
+        "motive columns": markers_csv(repeat(motive + ",Type", ",Marker", "\nFrame,X\n")),
+        "motive quotes": markers_csv(repeat(motive, '"')),
+        "nexus rows": markers_csv(repeat(nexus, "%d,0,1,2,3\n")),
+        "nexus sections": markers_csv(repeat(nexus[:-20], "Devices\n1\n\n")),
         "qualisys names": HostileFile(
             read_markers, "a.tsv", lambda size: qualisys(take(max(1, min(size // 20, 1000)), 1))
         ),
-        "table of markers": HostileFile(read_markers, "a.csv", repeat(wide, "%d,1,2,3,4,5,6,7,8,9\n")),
-        "table, gaps": HostileFile(read_markers, "a.csv", repeat(wide, "%d\n")),
-        "table, many names": HostileFile(
-            read_markers, "a.csv", repeat("time,marker,x,y,z\n", "%d,m,1,2,3\n", most=100_000)
-        ),
-        "table, a name each row": HostileFile(
-            read_markers, "a.csv", repeat("time,marker,x,y,z\n", "1,n%d,1,2,3\n")
-        ),
+        "table of markers": markers_csv(repeat(wide, "%d,1,2,3,4,5,6,7,8,9\n")),
+        "table, gaps": markers_csv(repeat(wide, "%d\n")),
+        "table, many names": markers_csv(repeat("time,marker,x,y,z\n", "%d,m,1,2,3\n", most=100_000)),
+        "table, a name each row": markers_csv(repeat("time,marker,x,y,z\n", "1,n%d,1,2,3\n")),
     }
 
 
 def _gltf() -> dict[str, HostileFile]:
     return {
-        "gltf surfaces": HostileFile(gltf_pieces, "a.glb", lambda size: surface(meshes=size // 12)),
-        "gltf heads": HostileFile(gltf_pieces, "a.glb", lambda size: surface(meshes=size // 22, name="head")),
-        "gltf targets": HostileFile(
-            gltf_pieces, "a.glb", lambda size: surface(targets=min(size // 16, 4_096))
-        ),
-        "gltf lists": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF + '"extras": [', "[],", "0]}")),
-        "gltf objects": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF + '"extras": [', "{},", "0]}")),
-        "gltf meshes": HostileFile(
-            gltf_pieces, "a.gltf", repeat(GLTF + '"meshes": [', '{"primitives":[]},', '{"primitives":[]}]}')
-        ),
-        "gltf materials": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF + '"materials": [', "{},", "{}]}")),
-        "gltf deep": HostileFile(gltf_pieces, "a.gltf", pairs(GLTF + '"extras": ', "[", "", "]", "}")),
-        "gltf members": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF, '"a%d":0,', '"b":0}')),
-        "gltf digits": HostileFile(gltf_pieces, "a.gltf", repeat(GLTF + '"scene": ', "1", "}")),
+        "gltf surfaces": glb_head(lambda size: surface(meshes=size // 12)),
+        "gltf heads": glb_head(lambda size: surface(meshes=size // 22, name="head")),
+        "gltf targets": glb_head(lambda size: surface(targets=min(size // 16, 4_096))),
+        "gltf lists": gltf_head(repeat(GLTF + '"extras": [', "[],", "0]}")),
+        "gltf objects": gltf_head(repeat(GLTF + '"extras": [', "{},", "0]}")),
+        "gltf meshes": gltf_head(repeat(GLTF + '"meshes": [', '{"primitives":[]},', '{"primitives":[]}]}')),
+        "gltf materials": gltf_head(repeat(GLTF + '"materials": [', "{},", "{}]}")),
+        "gltf deep": gltf_head(pairs(GLTF + '"extras": ', "[", "", "]", "}")),
+        "gltf members": gltf_head(repeat(GLTF, '"a%d":0,', '"b":0}')),
+        "gltf digits": gltf_head(repeat(GLTF + '"scene": ', "1", "}")),
         "gltf picture": HostileFile(
             read_picture, "a.glb", lambda size: surface(picture=deflated_picture(size // 5))
         ),
@@ -521,41 +520,35 @@ def _gltf() -> dict[str, HostileFile]:
 def _meshes() -> dict[str, HostileFile]:
     faces = "f 1 2 3\n"
     return {
-        "obj faces": HostileFile(read_obj, "a.obj", repeat(OBJ_HEAD, faces)),
-        "obj corners": HostileFile(read_obj, "a.obj", repeat(OBJ_HEAD + "f ", "1 ", "\n", most=500_000)),
-        "obj continued": HostileFile(read_obj, "a.obj", repeat(OBJ_HEAD + "f 1 2 3 ", "\\\n", "\n")),
-        "obj vertices": HostileFile(read_obj, "a.obj", repeat("", "v 0 0 0\n", faces)),
-        "obj groups": HostileFile(read_pieces, "a.obj", repeat(OBJ_HEAD, "g a%d\n" + faces)),
-        "obj materials": HostileFile(read_pieces, "a.obj", repeat(OBJ_HEAD, "g a\nusemtl m%d\n" + faces)),
-        "obj libraries": HostileFile(
-            read_pieces,
-            "a.obj",
+        "obj faces": obj_file(repeat(OBJ_HEAD, faces)),
+        "obj corners": obj_file(repeat(OBJ_HEAD + "f ", "1 ", "\n", most=500_000)),
+        "obj continued": obj_file(repeat(OBJ_HEAD + "f 1 2 3 ", "\\\n", "\n")),
+        "obj vertices": obj_file(repeat("", "v 0 0 0\n", faces)),
+        "obj groups": obj_pieces(repeat(OBJ_HEAD, "g a%d\n" + faces)),
+        "obj materials": obj_pieces(repeat(OBJ_HEAD, "g a\nusemtl m%d\n" + faces)),
+        "obj libraries": obj_pieces(
             repeat(OBJ_HEAD + faces, "mtllib a.mtl\n"),
             {"a.mtl": repeat("", "newmtl a%d\n")},
         ),
-        "obj pictures": HostileFile(
-            read_pieces,
-            "a.obj",
+        "obj pictures": obj_pieces(
             repeat(OBJ_HEAD + "mtllib a.mtl\n", "usemtl a%d\n" + faces, most=1000),
             {
                 "a.mtl": repeat("", "newmtl a%d\nmap_Kd a.png\n"),
                 "a.png": lambda size: b"\x89PNG" + bytes(size),
             },
         ),
-        "obj comments": HostileFile(read_obj, "a.obj", repeat(OBJ_HEAD + faces, "#" * 1000 + "\n")),
-        "ply ascii": HostileFile(read_ply, "a.ply", counted(PLY_HEAD, "3 0 1 2\n")),
-        "ply empty lists": HostileFile(read_ply, "a.ply", counted(PLY_HEAD, "0\n")),
-        "ply binary lists": HostileFile(read_ply, "a.ply", even_vertices),
-        "ply words": HostileFile(read_ply, "a.ply", repeat(PLY_HEAD % 1 + "3 0 1 2 ", "1 ")),
-        "ply header": HostileFile(read_ply, "a.ply", repeat("ply\n", "comment a\n", "end_header\n")),
-        "vrml quotes": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD + '"', '\\"')),
-        "vrml strings": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD, '"\n')),
-        "vrml sets": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD, VRML_SET)),
-        "vrml brackets": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD, "{")),
-        "vrml numbers": HostileFile(
-            read_vrml, "a.wrl", repeat(VRML_HEAD + "IndexedFaceSet { coordIndex [", "0 -1 0 -1\n", "] }")
-        ),
-        "vrml words": HostileFile(read_vrml, "a.wrl", repeat(VRML_HEAD, "a\n")),
+        "obj comments": obj_file(repeat(OBJ_HEAD + faces, "#" * 1000 + "\n")),
+        "ply ascii": ply_file(counted(PLY_HEAD, "3 0 1 2\n")),
+        "ply empty lists": ply_file(counted(PLY_HEAD, "0\n")),
+        "ply binary lists": ply_file(even_vertices),
+        "ply words": ply_file(repeat(PLY_HEAD % 1 + "3 0 1 2 ", "1 ")),
+        "ply header": ply_file(repeat("ply\n", "comment a\n", "end_header\n")),
+        "vrml quotes": vrml_file(repeat(VRML_HEAD + '"', '\\"')),
+        "vrml strings": vrml_file(repeat(VRML_HEAD, '"\n')),
+        "vrml sets": vrml_file(repeat(VRML_HEAD, VRML_SET)),
+        "vrml brackets": vrml_file(repeat(VRML_HEAD, "{")),
+        "vrml numbers": vrml_file(repeat(VRML_HEAD + "IndexedFaceSet { coordIndex [", "0 -1 0 -1\n", "] }")),
+        "vrml words": vrml_file(repeat(VRML_HEAD, "a\n")),
         "wfm rows": HostileFile(read_wfm, "a.wfm", table("0 0 0\n", 1)),
         "wfm comments": HostileFile(read_wfm, "a.wfm", repeat("", "#\n")),
     }
@@ -567,21 +560,17 @@ def _points() -> dict[str, HostileFile]:
         "points rows": HostileFile(read_points, "a.csv", repeat("name\n", "#\n")),
         "points commas": HostileFile(read_points, "a.csv", repeat("2.1", ",", most=1_000_000)),
         "points blanks": HostileFile(read_points, "a.csv", repeat("2.1", " ", "x", most=1_000_000)),
-        "points lists": HostileFile(read_points, "a.json", repeat('{"2.1": [', "[],", "0]}")),
-        "points objects": HostileFile(read_points, "a.json", repeat('{"2.1": [', "{},", "0]}")),
-        "points digits": HostileFile(read_points, "a.json", repeat('{"2.1": [', "1", ",0,0]}")),
-        "points deep": HostileFile(read_points, "a.json", pairs('{"2.1": ', "[", "", "]", "}")),
-        "fdp rows": HostileFile(read_points, "a.fdp", repeat("1.0 a\n", "99.99 0 0 0\n")),
-        "xface elements": HostileFile(read_points, "a.fdp", repeat(XFACE, "<a/>", XFACE_END)),
-        "xface deep": HostileFile(read_points, "a.fdp", pairs(XFACE, "<a>", "", "</a>", XFACE_END)),
-        "xface indices": HostileFile(
-            read_points,
-            "a.fdp",
+        "points lists": points_json(repeat('{"2.1": [', "[],", "0]}")),
+        "points objects": points_json(repeat('{"2.1": [', "{},", "0]}")),
+        "points digits": points_json(repeat('{"2.1": [', "1", ",0,0]}")),
+        "points deep": points_json(pairs('{"2.1": ', "[", "", "]", "}")),
+        "fdp rows": fdp_file(repeat("1.0 a\n", "99.99 0 0 0\n")),
+        "xface elements": fdp_file(repeat(XFACE, "<a/>", XFACE_END)),
+        "xface deep": fdp_file(pairs(XFACE, "<a>", "", "</a>", XFACE_END)),
+        "xface indices": fdp_file(
             repeat(XFACE + XFACE_POINT + "<indices>", "1 ", "</indices></fdp>" + XFACE_END),
         ),
-        "xface influences": HostileFile(
-            read_points,
-            "a.fdp",
+        "xface influences": fdp_file(
             pairs(
                 XFACE + XFACE_POINT + "<indices>",
                 "1 2 3 4 5 6 7 8 ",
@@ -590,44 +579,28 @@ def _points() -> dict[str, HostileFile]:
                 "</fdp>" + XFACE_END,
             ),
         ),
-        "xface submeshes": HostileFile(
-            read_points,
-            "a.fdp",
+        "xface submeshes": fdp_file(
             repeat(XFACE, '<fdp name="2.1" affects="a.wrl_%d" index="0"/>', XFACE_END),
             shape,
         ),
-        "xface attributes": HostileFile(read_points, "a.fdp", repeat("<xfdp ", 'a%d="" ', "/>")),
-        "body joints": HostileFile(
-            BodyDefinition.load, "a.json", repeat('{"joints": {', '"j%d": {"centre": [0, 0, 0]},', '"j": 0}}')
-        ),
-        "body lists": HostileFile(BodyDefinition.load, "a.json", repeat('{"joints": [', "[],", "0]}")),
-        "body digits": HostileFile(
-            BodyDefinition.load, "a.json", repeat('{"joints": {"a": {"centre": [', "1", ",0,0]}}}")
-        ),
-        "body name": HostileFile(
-            BodyDefinition.load, "a.json", repeat('{"joints": {"', "a", '": {"centre": 0}}}')
-        ),
+        "xface attributes": fdp_file(repeat("<xfdp ", 'a%d="" ', "/>")),
+        "body joints": body_json(repeat('{"joints": {', '"j%d": {"centre": [0, 0, 0]},', '"j": 0}}')),
+        "body lists": body_json(repeat('{"joints": [', "[],", "0]}")),
+        "body digits": body_json(repeat('{"joints": {"a": {"centre": [', "1", ",0,0]}}}")),
+        "body name": body_json(repeat('{"joints": {"', "a", '": {"centre": 0}}}')),
     }
 
 
 def _films() -> dict[str, HostileFile]:
     plane = b"\0\0\1\xbb\xff"
     return {
-        "mp4 samples": HostileFile(
-            fba.read, "a.mp4", lambda size: whole_file(Track([plane] * (size // 30), chunks=(1,)))
-        ),
-        "mp4 equal samples": HostileFile(fba.read, "a.mp4", equal_samples),
-        "mp4 fragments": HostileFile(
-            fba.read,
-            "a.mp4",
+        "mp4 samples": mp4_file(lambda size: whole_file(Track([plane] * (size // 30), chunks=(1,)))),
+        "mp4 equal samples": mp4_file(equal_samples),
+        "mp4 fragments": mp4_file(
             lambda size: fragmented_file(Track([plane] * (size // 120)), range(1, size // 120)),
         ),
-        "mp4 boxes": HostileFile(
-            fba.read, "a.mp4", lambda size: whole_file(Track([plane]), padding=box(b"free") * (size // 8))
-        ),
-        "mp4 tracks": HostileFile(
-            fba.read,
-            "a.mp4",
+        "mp4 boxes": mp4_file(lambda size: whole_file(Track([plane]), padding=box(b"free") * (size // 8))),
+        "mp4 tracks": mp4_file(
             lambda size: whole_file(*(Track([plane], number=n) for n in range(size // 560))),
         ),
     }

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from fba.face._expressions import Definitions
 from fba.face._tables import HEAD, KINDS, FaceDefMesh, FaceDefTables, FaceDefTransform
 from fba.face.feature_points import names, neutral_points
-from fba.face.interpolation._terms import Function, Link, Term
+from fba.face.interpolation._node import Function, Link, Term
 from fba.face.interpolation.table import InterpolationTable
 from fba.face.model import PART_KINDS, DetailLevel, FaceModel, Material, Part, shape_key
 from fba.parameters import faps, point_rows
@@ -212,12 +212,8 @@ def assert_same(one: FaceModel, other: FaceModel) -> None:
     assert one.fit == other.fit
     assert np.array_equal(one.definitions.visemes, other.definitions.visemes)
     assert np.array_equal(one.definitions.expressions, other.definitions.expressions)
-    assert (one.name, one.lost, one.notes, one.wrinkles) == (
-        other.name,
-        other.lost,
-        other.notes,
-        other.wrinkles,
-    )
+    for name in ("name", "lost", "notes", "wrinkles"):
+        assert getattr(one, name) == getattr(other, name)
 
 
 def vars_of(part: Part) -> dict[str, Any]:

@@ -4,7 +4,6 @@ Turns of threads while a film is encoded.
 """
 
 import sys
-import wave
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from PIL import Image
 from fba.errors import FormatError, UnsupportedError
 from fba_player.export._recorder import PROMPT_THREADS, PromptThreads, Recorder
 from fba_player.sound.soundtrack import Soundtrack, find_sound_beside
-from sound_clicks import click_time, sound, write_click
+from sound_clicks import click_time, sound, write_click, write_wave
 
 av = pytest.importorskip("av")
 
@@ -59,8 +58,7 @@ def test_every_picture_has_its_time_and_its_colours(tmp_path: Path, rate: str) -
         assert np.abs(shown.astype(int) - colour).max() <= 6
     with av.open(str(path)) as film:
         stream = film.streams.video[0]
-        assert stream.codec_context.name == "h264"
-        assert stream.codec_context.pix_fmt == "yuv420p"
+        assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
         assert stream.codec_context.colorspace == av.video.reformatter.Colorspace.ITU709
         assert stream.average_rate == Fraction(rate)
 
@@ -200,9 +198,7 @@ def test_files_without_sound_are_refused(tmp_path: Path) -> None:
 def test_samples_are_those_of_the_file(tmp_path: Path) -> None:
     """From any sample on, in pieces of any size, and silence where there is nothing."""
     wanted = np.arange(5000, dtype="<i2")
-    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
-        file.setparams((1, 2, 8000, 0, "NONE", ""))
-        file.writeframes(wanted.tobytes())
+    write_wave(tmp_path / "a.wav", wanted, 8000)
     soundtrack = Soundtrack(tmp_path / "a.wav", Fraction(1234, 8000))
     pieces = [soundtrack.take(size)[0] for size in (1, 1000, 2047, 0, 900)]
     soundtrack.close()

@@ -95,7 +95,6 @@ def test_a_clip_shows_itself_as_a_page_to_play(talking: Animation) -> None:
     assert "allow-same-origin" not in sandbox
     assert "allow-top-navigation" not in sandbox
     content = re.search(r'id="fba-content">(.*?)</script>', framed)
-    assert content is not None
     [source] = json.loads(content[1])["sources"]
     assert len(fba.decode(base64.b64decode(source["data"]))) == 4
 
@@ -129,8 +128,7 @@ def test_a_preview_is_a_small_film(talking: Animation) -> None:
     assert page.elements["video"]["width"] == "480"
     with av.open(io.BytesIO(page.data("video", "video/mp4"))) as film:
         frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
-    assert len(frames) == 4
-    assert frames[0].shape == (360, 480, 3)
+    assert (len(frames), frames[0].shape) == (4, (360, 480, 3))
     assert np.abs(frames[0].astype(int) - frames[3]).max() > 40  # the mouth opens
 
 

@@ -43,14 +43,12 @@ def spoken() -> Animation:
 def test_visemes_last_from_halfway_to_the_frame_before_to_halfway_to_the_next() -> None:
     """The mouth moves evenly between frames; visemes are in force until the next are sent."""
     lane = lane_of_visemes(spoken())
-    assert lane is not None
     assert lane.at(1.04) == [("A:", 1.0)]
     for time in (1.06, 1.24):  # frame 2 sends none
         assert lane.at(time) == [("e", pytest.approx(2 / 3)), ("A:", pytest.approx(1 / 3))]
     assert lane.at(1.3) == [("e", 1.0)]
     assert lane.at(1.4) == []  # "none" was sent
-    assert lane.at(0.95) == []
-    assert lane.text(1.1) == "e 67%, A: 33%"
+    assert (lane.at(0.95), lane.text(1.1)) == ([], "e 67%, A: 33%")
     assert lane.named(0.0, 9.0, 0.01) == [
         (1.0, pytest.approx(1.25), "A:"),
         (pytest.approx(1.05), pytest.approx(1.35), "e"),
@@ -67,7 +65,6 @@ def test_the_lane_of_speech_agrees_with_its_phones() -> None:
     phones[0] = replace(phones[0], start=0.0)
     speech = Speech(tuple(phones), (), float(ends[-1]))
     lane = lane_of_visemes(perform(speech, coding="visemes", life=0, keep_goal=False))
-    assert lane is not None
     shown = [(start, name) for start, _, name in lane.named(0, 9, 0.01)]
     expected = [shape for shape in find_shapes(phones) if shape.viseme]
     assert [name for _, name in shown] == [VISEMES[shape.viseme] for shape in expected]
@@ -78,9 +75,7 @@ def test_the_lane_of_speech_agrees_with_its_phones() -> None:
 
 def test_expressions_last_to_the_end_of_the_last_frame() -> None:
     lane = lane_of_expressions(spoken())
-    assert lane is not None
-    assert lane.at(1.19) == []
-    assert lane.text(1.59) == "joy 63 of 63, anger 21 of 63"
+    assert (lane.at(1.19), lane.text(1.59)) == ([], "joy 63 of 63, anger 21 of 63")
     assert lane.at(1.61) == []
 
 
@@ -172,7 +167,6 @@ def test_stretches_follow_each_other() -> None:
     assert 60 < anger.intensity <= 100
     assert str(anger) == f"anger {anger.intensity:.0f}"
     lane = lane_of_stretches(found)
-    assert lane is not None
     assert lane.at(5.0) == [("anger", pytest.approx(anger.intensity / 100))]
     assert lane.at(8.5) == []
     assert lane_of_stretches(found[:1]) is None  # neutral
@@ -194,7 +188,6 @@ def test_a_source_reads_them_in_the_background() -> None:
     felt = source.lanes[-1]
     assert (felt.name, felt.labels, felt.estimated) == ("felt", ("anger",), True)
     assert felt.text(4.0 - 1.0) == str(source.expressions[1])
-    assert source.activity is not None
     assert "brows" in source.activity.names
 
 

@@ -11,8 +11,7 @@ from fba_player.gl._annotation_renderer import LEGEND_MARGIN, NAME_SIZE, REFEREN
 from fba_player.gl._labels import legend_picture
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Transport
-from fba_player.scene._compare_timeline import CompareTimeline
-from fba_player.scene._differences import differences
+from fba_player.scene._compare_timeline import CompareTimeline, differences
 from fba_player.scene.compare import ROOTS, CompareScene, distances, round_up
 from fba_player.scene.scene import Scene
 from fba_player.view._geometry import project
@@ -49,8 +48,7 @@ def test_frames_of_both_rates_are_on_one_line() -> None:
         Fraction(0), Fraction(1, 15), Fraction(1, 10), Fraction(2, 15), Fraction(1, 5),
     ]  # fmt: skip
     assert (timeline.start, timeline.end) == (0, Fraction(3, 10))
-    assert timeline.position(0.1) == (2, 3, 0.0)
-    assert timeline.position(0.05)[:2] == (0, 1)
+    assert (timeline.position(0.1), timeline.position(0.05)[:2]) == ((2, 3, 0.0), (0, 1))
     assert timeline.position(99.0)[0] == 4
     with pytest.raises(ValueError, match="finite"):
         timeline.position(float("nan"))
@@ -250,9 +248,7 @@ def test_colours_are_of_the_distance_from_the_first(pair: CompareScene) -> None:
         count = len(pair.scenes[0].view_at(0.0).faces)
         painted = view.faces[count:]
         assert all(mesh.looks is None for mesh in view.faces[:count])
-        assert view.extras is not None
         legend = view.extras.legend
-        assert legend is not None
         own = pair.scenes[1].view_at(0.0).faces
         away = distances(own, pair.scenes[0].view_at(0.0).faces, np.zeros(3))
         most = max(float(each.max()) for each in away)
@@ -261,7 +257,6 @@ def test_colours_are_of_the_distance_from_the_first(pair: CompareScene) -> None:
         moved = {mesh.shape.name: each for mesh, each in zip(own, away, strict=True)}
         skin = max(moved, key=lambda name: float(moved[name].max()))
         looks = parts[skin].looks
-        assert looks is not None
         still, far = looks[moved[skin] == 0, :3], looks[moved[skin].argmax(), :3]
         assert (still == still[0]).all()
         assert np.abs(far - still[0]).max() > 0.2
@@ -277,7 +272,6 @@ def test_names_stand_below_the_legend_of_colours(pair: CompareScene) -> None:
         extras = pair.view_at(0.1).extras
     finally:
         pair.arrangement = "side"
-    assert extras is not None
     assert extras.legend is not None
     low = LEGEND_MARGIN + legend_picture(extras.legend, 1.0).shape[0]
     pixels = project(extras.dots[-1].positions.astype(float), camera.clip_matrix(size), size)[0]
@@ -310,7 +304,6 @@ def test_a_common_root_is_that_of_the_first() -> None:
         scene.root = root
         for time in (0.0, 0.16):
             view = scene.view_at(time)
-            assert view.wipe is not None
             eyes = [each.eyes[0].matrix[:3, 3] for each in (view, view.wipe.view)]
             apart[root, time] = float(np.linalg.norm(eyes[1] - eyes[0]))
     own = apart["own", 0.16] - apart["own", 0.0]

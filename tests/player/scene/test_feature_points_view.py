@@ -59,13 +59,11 @@ def test_on_a_body_the_points_go_with_the_head() -> None:
     baps = {1: 0, 181: 100, 182: 200, 183: -300}
     animation = Animation(25, np.arange(1), face_track([{3: 500}]), body_track([baps]))  # type: ignore[arg-type]
     assert animation.face is not None
-    assert animation.body is not None
     body = BodyModel.default()
     joints = BapSolver(body.skeleton).pose(animation.body.values[0])
     shift = joints[0, :3, 3] - body.skeleton.centres[0]  # the root alone moves
     scene = Scene(animation, view="points")
     alone = Deformer(scene.model).feature_points(resolve(animation.face, scene.model)[0])
-    assert body.eyes is not None
     # The skull stands in the default posture as it was modelled, but elsewhere.
     skull = body.skeleton.number("skullbase")
     stands = body.eyes.mean(axis=0) + body.skeleton.centres[skull] - body.bind[skull, :3, 3]
@@ -75,7 +73,6 @@ def test_on_a_body_the_points_go_with_the_head() -> None:
 
 def test_every_bone_and_joint_has_its_capsule(walking: Animation) -> None:
     skeleton = BodyModel.default().skeleton
-    assert walking.body is not None
     capsules = Scene(walking, view="points").view_at(0.2).capsules[2:]  # behind the eyeballs
     places = GroundedPoser(skeleton).pose(walking.body.values[5])[:, :3, 3]
     bones, joints = capsules[: len(places) - 1], capsules[len(places) - 1 :]
@@ -132,8 +129,7 @@ def test_the_view_is_checked_and_may_change(talking: Animation) -> None:
     with pytest.raises(ValueError, match="figure, points"):
         Scene(talking, view="wire")
     scene = Scene(talking)
-    assert scene.view == "figure"
-    assert len(scene.view_at(0.0).marks) == 0
+    assert (scene.view, len(scene.view_at(0.0).marks)) == ("figure", 0)
     scene.view = "points"
     assert len(scene.view_at(0.0).marks) == 84
     scene.view = "figure"

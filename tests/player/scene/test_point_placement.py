@@ -88,8 +88,7 @@ def test_mirror_places_the_other_side_about_the_middle_of_the_head(placement: Po
     placement.remove()  # it lies at x = 9
     placement.choose("3.5")
     placement.place(2)
-    assert placement.mirror() == "3.6"
-    assert placement.places["3.6"] == 3
+    assert (placement.mirror(), placement.places["3.6"]) == ("3.6", 3)
     placement.choose("8.4")
     assert placement.mirror() is None  # neither side has a place
     placement.choose("8.3")
@@ -204,7 +203,6 @@ def test_a_ray_meets_the_nearest_triangle_from_either_side() -> None:
     walls = np.array([[[-1, -1, z], [1, -1, z], [0, 2, z]] for z in (-1.0, 1.0)])
     for origin, towards, nearest in ((5.0, -1.0, 1), (-5.0, 1.0, 0)):
         hit = first_hit(np.array([0.0, -1.0, origin]), np.array([0.0, 0.0, towards]), walls)
-        assert hit is not None
         assert hit[0] == nearest
         np.testing.assert_allclose(hit[1], [0.5, 0.5, 0], atol=1e-12)
     assert first_hit(np.array([3.0, 0, 5]), np.array([0.0, 0, -1]), walls) is None
@@ -245,7 +243,6 @@ def test_dots_show_the_current_point_its_mate_and_the_others(placement: PointPla
 
     def dots() -> list[tuple[str, ...]]:
         extras = scene.view_at(0.0).extras
-        assert extras is not None
         return [group.names for group in extras.dots]
 
     assert dots() == [("2.1",), ("3.6",), ("3.5",)]

@@ -25,10 +25,16 @@ def played() -> tuple[np.ndarray, np.ndarray]:
     return np.arange(1001, 1069, dtype=np.float32), np.arange(2001, 2297, dtype=np.float64)
 
 
-def test_an_untouched_puppet_changes_nothing() -> None:
-    puppet = Puppet()
+def shown(puppet: Puppet) -> tuple[np.ndarray, np.ndarray]:
+    """What the puppet makes of what is played."""
     faps, baps = played()
     puppet(faps, baps)
+    return faps, baps
+
+
+def test_an_untouched_puppet_changes_nothing() -> None:
+    puppet = Puppet()
+    faps, baps = shown(puppet)
     assert puppet.idle
     np.testing.assert_array_equal(faps, played()[0])
     np.testing.assert_array_equal(baps, played()[1])
@@ -38,14 +44,12 @@ def test_what_is_moved_stays_until_released() -> None:
     puppet = Puppet()
     puppet.move_fap(3, 400)
     puppet.move_bap(32, -5e4)
-    faps, baps = played()
-    puppet(faps, baps)
+    faps, baps = shown(puppet)
     assert (faps[2], faps[3], baps[31], baps[32]) == (400, 1004, -5e4, 2033)
     assert (puppet.motion[0][2], puppet.motion[1][31]) == (1003, 2032)  # what is played is still known
     assert puppet.shown[0][2] == 400
     puppet.release(faps=(3,))
-    faps, baps = played()
-    puppet(faps, baps)
+    faps, baps = shown(puppet)
     assert (faps[2], baps[31]) == (1003, -5e4)
     puppet.release_all()
     assert puppet.idle
@@ -54,32 +58,25 @@ def test_what_is_moved_stays_until_released() -> None:
 def test_a_viseme_takes_the_mouth_and_leaves_the_brows() -> None:
     puppet = Puppet()
     puppet.viseme = Viseme(10, 0, 63)  # A:
-    faps, baps = played()
-    puppet(faps, baps)
+    faps = shown(puppet)[0]
     assert 0 < faps[2] < 1000  # open_jaw as the table has it
     assert faps[30] == 1031  # raise_l_i_eyebrow
     half = Puppet()
     half.viseme = Viseme(10, 0, 21)
-    weaker, baps = played()
-    half(weaker, baps)
-    assert weaker[2] == pytest.approx(faps[2] / 3)
+    assert shown(half)[0][2] == pytest.approx(faps[2] / 3)
 
 
 def test_an_expression_is_added_and_a_slider_wins() -> None:
     puppet = Puppet()
     puppet.expression = Expression(6, 63)  # surprise
-    faps, baps = played()
-    puppet(faps, baps)
-    raised = faps[30]
+    raised = shown(puppet)[0][30]
     assert raised > 1031
     puppet.move_fap(31, -7)
-    faps, baps = played()
-    puppet(faps, baps)
+    faps = shown(puppet)[0]
     assert (faps[30], faps[31]) == (-7, pytest.approx(raised + 1))
     puppet.release(faps=(31,))
     puppet.expression = Expression(6, 63, 6, 63)  # twice the same is not twice as much
-    faps, baps = played()
-    puppet(faps, baps)
+    faps = shown(puppet)[0]
     assert faps[30] == pytest.approx(raised)
 
 
@@ -114,8 +111,6 @@ def test_a_take_does_not_depend_on_how_often_it_is_drawn(pictures: int) -> None:
     ramp(recorder, np.arange(2 * pictures + 1) / pictures)
     take = recorder.take()
     assert (len(take), take.rate) == (51, 25)
-    assert take.face is not None
-    assert take.body is not None
     assert take.face.values[:, 2].tolist() == [4 * t for t in range(51)]
     assert take.body.values[:, 31].tolist() == [400 * t for t in range(51)]
 
@@ -124,7 +119,6 @@ def test_where_nothing_was_drawn_nothing_changed() -> None:
     recorder = TakeRecorder(Fraction(25))
     ramp(recorder, np.array([0.0, 2.0]))
     face = recorder.take().face
-    assert face is not None
     assert face.values[:, 2].tolist() == [0] * 50 + [200]
 
 
@@ -132,8 +126,6 @@ def test_masks_say_all_faps_and_the_baps_that_moved() -> None:
     recorder = TakeRecorder(Fraction(25), body=True)
     ramp(recorder, np.arange(10) / 25)
     take = recorder.take()
-    assert take.face is not None
-    assert take.body is not None
     assert (np.flatnonzero(~take.face.mask.any(axis=0)) + 1).tolist() == [1, 2]
     assert (np.flatnonzero(take.body.mask.all(axis=0)) + 1).tolist() == [32, 181, 182, 183, 184, 185, 186]
     assert not take.body.mask[:, 32:180].any()
@@ -166,18 +158,6 @@ def test_a_take_has_the_rate_of_the_stream_within_limits(rate: str, wanted: str)
     assert take_rate(Fraction(rate)) == Fraction(wanted)
 
 
-@pytest.mark.parametrize(("pause", "between"), [(0.19, True), (0.21, False)])
-def test_a_take_is_interpolated_over_short_pauses_only(pause: float, between: bool) -> None:
-    """Where nothing was drawn for more than 0.2 s, nothing moved until the next picture."""
-    recorder = TakeRecorder(Fraction(100))
-    recorder.add(0.0, np.zeros(68, np.float32), np.zeros(296))
-    recorder.add(pause, np.full(68, 1000, np.float32), np.zeros(296))
-    face = recorder.take().face
-    assert face is not None
-    assert bool(face.values[10, 2]) == between
-    assert face.values[-1, 2] == 1000
-
-
 def test_a_take_comes_back_from_its_file(tmp_path: Path) -> None:
     recorder = TakeRecorder(Fraction(30), body=True)
     rng = np.random.default_rng(3)
@@ -194,7 +174,6 @@ def test_a_take_comes_back_from_its_file(tmp_path: Path) -> None:
     back = fba.read(path)
     assert back.rate == 30
     assert back.face is not None
-    assert back.body is not None
     fap_steps = fba.parameters.fap_steps()
     # predictive coding with the finest quantiser errs by half a step, and one for what was not a whole step
     assert (np.abs(resolve(back.face) - wanted).max(axis=0)[2:] <= fap_steps[2:]).all()
@@ -216,11 +195,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
         takes.save("mine")
     assert path.read_bytes() == before
     undone = takes.undo()
-    assert undone is not None
-    assert undone.face is not None
     assert undone.face.values[0, 2] == 200
-    assert takes.last is not None
-    assert takes.last.face is not None
     assert takes.last.face.values[0, 2] == 100
     for name in ("", "  ", "folder/", ".."):
         with pytest.raises(FormatError, match="not a file name"):
@@ -238,7 +213,6 @@ def test_an_arm_lifted_high_needs_the_wider_steps(tmp_path: Path) -> None:
     path, steps = takes.save("lifted")
     assert steps == "visage"
     body = fba.read(path, bap_steps=steps).body
-    assert body is not None
     assert np.abs(body.values[:, 33] - (232000 - 1000 * np.arange(5))).max() <= 170
 
 
@@ -248,9 +222,7 @@ def test_a_gap_of_a_fifth_of_a_second_is_no_motion(gap: float, joined: bool) -> 
     recorder = TakeRecorder(Fraction(100))
     ramp(recorder, np.array([0.0, gap]))
     face = recorder.take().face
-    assert face is not None
-    assert (face.values[10, 2] == 10) == joined
-    assert (face.values[10, 2] == 0) != joined
+    assert face.values[[10, -1], 2].tolist() == [10 * joined, round(100 * gap)]
 
 
 def test_a_take_ends_after_an_hour() -> None:
@@ -267,8 +239,7 @@ def test_a_take_ends_after_an_hour() -> None:
 def test_the_mouth_opens_jaw_and_lips_over_what_is_played() -> None:
     puppet = Puppet()
     puppet.mouth_opening = 50
-    faps, baps = played()
-    puppet(faps, baps)
+    faps = shown(puppet)[0]
     assert not puppet.idle
     assert (faps[2], faps[4], faps[51], faps[18]) == (1003 + 250, 1005 - 300, 1052 - 300, 1019)
     puppet.release_all()

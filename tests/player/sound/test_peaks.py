@@ -1,6 +1,5 @@
 """The outline of a sound: its lowest and highest samples over time."""
 
-import wave
 from pathlib import Path
 
 import numpy as np
@@ -9,19 +8,11 @@ import pytest
 import graphics
 from fba_player.sound import _peaks
 from fba_player.sound._peaks import Outline, Peaks, peaks_picture
+from sound_clicks import write_wave
 
 graphics.imported("av")
 
 RATE = 8000
-
-
-def write_wave(path: Path, samples: np.ndarray) -> Path:
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(RATE)
-        file.writeframes(samples.astype("<i2").tobytes())
-    return path
 
 
 def outline_of(path: Path) -> Outline:
@@ -40,7 +31,7 @@ def loud_second(seconds: float) -> np.ndarray:
 
 
 def test_each_hundredth_of_a_second_has_its_extremes(tmp_path: Path) -> None:
-    outline = outline_of(write_wave(tmp_path / "a.wav", loud_second(3.005)))
+    outline = outline_of(write_wave(tmp_path / "a.wav", loud_second(3.005), RATE))
     assert outline.whole
     assert outline.seconds == pytest.approx(0.01)
     assert len(outline.low) == len(outline.high) == 301
@@ -53,7 +44,7 @@ def test_each_hundredth_of_a_second_has_its_extremes(tmp_path: Path) -> None:
 def test_long_sounds_take_bounded_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_peaks, "MOST_BUCKETS", 128)
     monkeypatch.setattr(_peaks, "BUCKETS_AT_ONCE", 64)
-    outline = outline_of(write_wave(tmp_path / "a.wav", loud_second(20)))
+    outline = outline_of(write_wave(tmp_path / "a.wav", loud_second(20), RATE))
     assert len(outline.low) <= 128
     assert outline.seconds in (0.16, 0.32)
     assert len(outline.low) * outline.seconds == pytest.approx(20, abs=0.64)
@@ -69,7 +60,7 @@ def test_what_is_no_sound_has_no_outline(tmp_path: Path) -> None:
 
 
 def test_reading_can_be_stopped(tmp_path: Path) -> None:
-    peaks = Peaks(write_wave(tmp_path / "a.wav", loud_second(3)))
+    peaks = Peaks(write_wave(tmp_path / "a.wav", loud_second(3), RATE))
     peaks.close()  # before it has begun
     peaks.start()
     peaks.close()

@@ -1,5 +1,6 @@
-"""What a device is given, from where the performance is: the sound itself says which sample it is."""
+"""What a sound device is given, and its clock, with devices that are unpunctual, fast, and that stop."""
 
+import random
 from fractions import Fraction
 
 import numpy as np
@@ -9,6 +10,7 @@ from fba.animation import Animation
 from fba_player.playback._timeline import Timeline
 from fba_player.playback._transport import Motion, Transport
 from fba_player.sound._mixer import FADE_SECONDS, SoundMixer
+from fba_player.sound._player import SoundClock
 from player_tracks import face_track
 
 RATE = 1000
@@ -25,13 +27,18 @@ def ramp(start: int, count: int) -> np.ndarray:
 class Player:
     """A transport of four seconds at one frame each tenth, and a mixer for it on one clock."""
 
-    def __init__(self, start: int = 0, origin: float | None = None) -> None:
+    def __init__(
+        self, start: int = 0, origin: float | None = None, playing_from: float | None = None
+    ) -> None:
         frames = np.arange(start, start + 40)
         animation = Animation(Fraction(10), frames, face=face_track([{3: 1}] * 40))
         self.now = 50.0
         self.transport = Transport(Timeline(animation), loop=False, clock=lambda: self.now)
         begin = self.transport.start if origin is None else origin
         self.mixer = SoundMixer(ramp, RATE, lambda: self.transport.motion, begin)
+        if playing_from is not None:
+            self.transport.seek(playing_from)
+            self.transport.play()
 
     def hear(self, count: int) -> np.ndarray:
         """The next samples of the left side; the clock moves on."""
@@ -52,8 +59,7 @@ def test_the_sound_is_that_of_the_time_shown() -> None:
 
 
 def test_pause_ends_softly_and_play_goes_on_there() -> None:
-    player = Player()
-    player.transport.play()
+    player = Player(playing_from=0.0)
     player.hear(500)
     player.transport.pause()
     heard = player.hear(100)
@@ -64,8 +70,7 @@ def test_pause_ends_softly_and_play_goes_on_there() -> None:
 
 
 def test_the_sound_is_moved_while_it_is_heard() -> None:
-    player = Player()
-    player.transport.play()
+    player = Player(playing_from=0.0)
     player.hear(500)
     player.mixer.origin = player.transport.start + 0.2  # begins later
     np.testing.assert_array_equal(player.hear(100)[FADED:], np.arange(300 + FADED, 400))
@@ -74,8 +79,7 @@ def test_the_sound_is_moved_while_it_is_heard() -> None:
 
 
 def test_seeking_goes_over_softly() -> None:
-    player = Player()
-    player.transport.play()
+    player = Player(playing_from=0.0)
     player.hear(500)
     player.transport.seek(3.0)
     heard = player.hear(100)
@@ -97,9 +101,7 @@ def test_a_loop_turns_inside_a_buffer() -> None:
 
 
 def test_the_end_is_silent() -> None:
-    player = Player()
-    player.transport.seek(3.85)
-    player.transport.play()
+    player = Player(playing_from=3.85)
     heard = player.hear(300)
     np.testing.assert_array_equal(heard[FADED:150], np.arange(3850 + FADED, 4000))
     assert not heard[150 + FADED :].any()
@@ -117,8 +119,7 @@ def test_other_speeds_keep_in_step_like_a_tape(speed: float) -> None:
 
 
 def test_changing_the_speed_does_not_jump() -> None:
-    player = Player()
-    player.transport.play()
+    player = Player(playing_from=0.0)
     heard = [player.hear(200)]
     player.transport.set_speed(2.0)
     heard.append(player.hear(200))
@@ -146,9 +147,7 @@ def test_before_and_after_the_sound_there_is_silence() -> None:
 
 
 def test_volume_and_muting() -> None:
-    player = Player()
-    player.transport.seek(2.0)
-    player.transport.play()
+    player = Player(playing_from=2.0)
     player.hear(50)
     player.mixer.volume = 0.5
     np.testing.assert_allclose(player.hear(50), np.arange(2050, 2100) * 0.5, atol=0.5)
@@ -170,9 +169,7 @@ def test_a_motion_tells_when_it_turns() -> None:
 
 def test_fades_last_four_milliseconds() -> None:
     """Shorter ones click, longer ones swallow the beginning of a word."""
-    player = Player()
-    player.transport.seek(1.0)
-    player.transport.play()
+    player = Player(playing_from=1.0)
     heard = player.hear(10)
     np.testing.assert_array_equal(heard[4:], np.arange(1004, 1010))
     np.testing.assert_allclose(heard[:4] / np.arange(1000, 1004), [0, 0.25, 0.5, 0.75], atol=0.001)
@@ -183,9 +180,7 @@ def test_fades_last_four_milliseconds() -> None:
 )
 def test_a_clock_that_is_off_by_two_milliseconds_makes_no_jump(slip: float, jumps: bool) -> None:
     """Nobody sees that; each jump would be heard."""
-    player = Player()
-    player.transport.seek(1.0)
-    player.transport.play()
+    player = Player(playing_from=1.0)
     player.hear(100)
     player.now += slip
     heard = player.hear(100)[4:]
@@ -193,3 +188,100 @@ def test_a_clock_that_is_off_by_two_milliseconds_makes_no_jump(slip: float, jump
     assert np.array_equal(heard, straight_on) != jumps
     if jumps:
         assert abs(heard - straight_on - 1000 * slip).max() <= 1
+
+
+DEVICE_RATE, PERIOD, LATENCY = 48_000, 0.04, 0.08
+COUNT = 1920  # samples of a period
+
+
+class Device:
+    """Takes a period whenever one has been played, as a device does that holds three."""
+
+    def __init__(self, pace: float = 1.0, lateness: float = 0.0) -> None:
+        self.now = 500.0
+        self.begun = self.now
+        self.pace = pace
+        self.lateness = lateness
+        self.random = random.Random(7)
+        self.calls = 0
+        self.clock = SoundClock(DEVICE_RATE, LATENCY, monotonic=lambda: self.now)
+        self.firsts: list[float] = []
+
+    def run(self, seconds: float) -> None:
+        """Call the clock as the device would."""
+        for _ in range(round(seconds / PERIOD)):
+            free = self.begun + max(self.calls - 2, 0) * PERIOD / self.pace
+            self.now = max(free + self.random.random() * self.lateness, self.now)
+            self.firsts.append(self.clock.take(COUNT))
+            self.calls += 1
+
+    @property
+    def heard(self) -> float:
+        """Seconds of sound that the device has really played."""
+        return (self.now - self.begun) * self.pace
+
+
+def test_it_counts_samples_from_the_first_that_is_heard() -> None:
+    device = Device()
+    assert device.clock() == -LATENCY  # nothing is heard yet
+    device.run(1.0)
+    assert device.firsts[:3] == pytest.approx([0.0, 0.04, 0.08])
+    assert device.clock() == pytest.approx(device.heard)
+    device.now += 0.03  # between two calls the wall clock goes on
+    assert device.clock() == pytest.approx(device.heard)
+
+
+@pytest.mark.parametrize("pace", [0.999, 1.0, 1.001])
+def test_ten_minutes_with_a_device_that_is_off_by_a_thousandth(pace: float) -> None:
+    device = Device(pace, lateness=0.015)
+    worst = 0.0
+    for _ in range(600):
+        device.run(1.0)
+        worst = max(worst, abs(device.clock() - device.heard))
+    assert abs(device.heard - (device.now - device.begun)) == pytest.approx(abs(pace - 1) * 600, abs=1e-3)
+    assert worst < 0.020
+
+
+def test_unpunctual_calls_never_turn_it_back() -> None:
+    device = Device(lateness=0.035)
+    last = -1.0
+    for _ in range(500):
+        device.run(PERIOD)
+        for ahead in (0.0, 0.01, 0.02):
+            device.now += ahead
+            now = device.clock()
+            assert now >= last
+            last = now
+
+
+def test_a_call_that_comes_late_changes_nothing() -> None:
+    device = Device()
+    device.run(2.0)
+    device.now += 0.3  # it played on by itself, and asks for more at once
+    device.run(2.0)
+    assert device.firsts == pytest.approx([n * PERIOD for n in range(100)])
+    assert device.clock() == pytest.approx(device.heard, abs=0.005)
+
+
+def test_a_device_that_stops_for_a_while_loses_that_sound() -> None:
+    device = Device()
+    device.run(2.0)
+    before, first = device.clock(), device.firsts[-1]
+    device.now += 3.0
+    assert device.clock() == pytest.approx(before + 3.0)  # the picture goes on
+    device.begun += 3.0
+    device.run(1.0)  # half of that to be sure
+    assert device.firsts[-1] == pytest.approx(first + 4.0, abs=0.05)  # and the sound is at the same place
+    assert device.clock() == pytest.approx(before + 4.0, abs=0.05)
+
+
+def test_unpunctual_calls_hardly_move_it() -> None:
+    """Calls are up to 35 ms late; each may move the clock by a twentieth of that, which is less than 2 ms."""
+    device = Device(lateness=0.035)
+    device.run(5.0)
+    moves = []
+    for _ in range(500):
+        before = device.clock() - device.now
+        device.run(PERIOD)
+        moves.append(device.clock() - device.now - before)
+    assert max(map(abs, moves)) < 0.002

@@ -129,7 +129,6 @@ def test_names_stand_below_the_buttons_of_the_panels(studio: Studio, size: tuple
     session.viewpoint.aspect = size[0] / size[1]
     studio.draw(4)
     captions = session.scene.view_at(0.0).extras
-    assert captions is not None
     at = captions.dots[-1].positions
     clip = session.camera(0.0).clip_matrix(size) @ np.column_stack([at, np.ones(len(at))]).T
     assert ((1 - clip[1] / clip[3]) / 2 * size[1] > EDGE + BUTTONS_HEIGHT + 9).all()  # half a name

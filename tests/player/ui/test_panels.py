@@ -214,7 +214,6 @@ def test_a_notice_appears_and_disappears(studio: Studio, clock: Clock) -> None:
 
 def test_the_trace_marks_the_intra_planes(studio: Studio) -> None:
     info = studio.session.source.info
-    assert info.plane_intra is not None
     assert info.plane_intra.tolist() == [True] + [False] * 9
     picture = studio.draw(1).astype(int)
     left, top, right, bottom = (round(v) for v in studio.gui.bar.area)

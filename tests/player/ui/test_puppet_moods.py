@@ -13,8 +13,7 @@ from fba.errors import OptionError
 from fba.tracks import FaceTrack
 from fba_player.playback._transport import Transport
 from fba_player.scene.scene import Scene
-from fba_player.session._mood import COMMON, PuppetMood
-from fba_player.session._puppet import Puppet
+from fba_player.session._puppet import COMMON, Puppet, PuppetMood
 from fba_player.session._session import Session
 from set_clock import Clock
 from studio_hand import StudioHand, panel_of
@@ -40,8 +39,7 @@ class TestMood:
         assert list(mood.weights) == [*COMMON, "terror"]
         mood.release()
         assert not mood.active
-        assert mood.point is None
-        assert mood.weights["terror"] == 0
+        assert (mood.point, mood.weights["terror"]) == (None, 0)
 
     def test_values_out_of_range_are_limited(self) -> None:
         mood = PuppetMood()
@@ -119,8 +117,6 @@ def test_a_path_over_the_plane_is_a_take(studio: Studio, clock: Clock) -> None:
         studio.draw(1)
     performer.stop()
     take = performer.takes.last
-    assert take is not None
-    assert take.face is not None
     brow = take.face.values[:, BROW]
     assert brow[0] == 0
     assert brow[-1] == pytest.approx(expression("surprise").faps[BROW], rel=0.05)

@@ -65,8 +65,7 @@ def test_off_all_monitors_it_takes_the_first_and_without_one_it_stays() -> None:
     assert far.on == "left"
     none = Glfw(0, ())
     FullScreen(none, object()).toggle()
-    assert none.on is None
-    assert none.place == (0, 50, 800, 600)
+    assert (none.on, none.place) == (None, (0, 50, 800, 600))
 
 
 def test_overlap() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -16,18 +15,19 @@ import graphics
 from fba.capture.markers._motion import MarkerMotion
 from fba.capture.markers._targets import target_points
 from fba.capture.virtual_markers import MarkedHead, MarkerMapping, propose_mapping, read_head, read_mapping
-from fba.errors import DisplayError, OptionError
+from fba.errors import OptionError
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.scene.markers_scene import CURRENT, MarkersScene
 from fba_player.session._session import Session
 from mesh_files import write_obj
-from open_windows import settle
+from open_windows import or_skip, press, settle
 from small_head import small_head
 
 glfw = graphics.imported("glfw")
 graphics.imported("imgui_bundle")
 
-from fba_player.window.pages import check_page, open_markers  # noqa: E402
+from fba_player.window.pages import open_markers  # noqa: E402
+from studio_hand import StudioHand  # noqa: E402
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (900, 560)
@@ -89,17 +89,9 @@ def in_cloud(session: Session, name: str) -> tuple[float, float]:
     return pixel_of(session, scene._cloud(0, 0, 0.0)[MARKED.index(name)])
 
 
-def click(studio: Studio, at: tuple[float, float]) -> None:
-    studio.gui.io.add_mouse_pos_event(*at)
-    studio.draw(2)
-    for down in (True, False):
-        studio.gui.io.add_mouse_button_event(0, down)
-        studio.draw(2)
-
-
 def test_clicks_choose_a_marker_and_put_it_on_the_head(studio: Studio, editing: MarkerEditing) -> None:
     session = studio.session
-    click(studio, in_cloud(session, "8.2"))
+    StudioHand(studio).click(*in_cloud(session, "8.2"))
     assert editing.current == "8.2"
     before = editing.mapping.markers["8.2"]
     camera = session.viewpoint.camera
@@ -109,7 +101,7 @@ def test_clicks_choose_a_marker_and_put_it_on_the_head(studio: Studio, editing: 
     front = [vertex for vertex in editing.head.face if editing.head.vertices[vertex, 2] > 0]
     apart = np.linalg.norm(editing.head.vertices[front][:, None, :2] - centres[None, :, :2], axis=2)
     free = front[int(apart.min(axis=1).argmax())]
-    click(studio, on_head(session, int(free)))
+    StudioHand(studio).click(*on_head(session, int(free)))
     assert editing.mapping.markers["8.2"].vertex != before.vertex
     assert editing.mapping.markers["8.2"].radius == before.radius
     assert session.unsaved == {"the mapping"}
@@ -118,9 +110,9 @@ def test_clicks_choose_a_marker_and_put_it_on_the_head(studio: Studio, editing: 
     assert editing.mapping.markers["8.2"] == before
     other = editing.mapping.markers["9.3"].vertex
     assert other == bound[small_row("9.3")]
-    click(studio, on_head(session, int(other)))  # on the dot of another: chooses it
+    StudioHand(studio).click(*on_head(session, int(other)))  # on the dot of another: chooses it
     assert editing.current == "9.3"
-    click(studio, (3, SIZE[1] - 200))
+    StudioHand(studio).click(3, SIZE[1] - 200)
     assert "Click on a marker" in session.notices()[-1].text
 
 
@@ -171,14 +163,11 @@ def test_changes_are_made_undone_and_saved(editing: MarkerEditing, head: MarkedH
         editing.resize(size, 0.02)
     assert editing.mapping.markers["8.2"].radius == 0.013
     reach = editing.influence
-    assert reach is not None
     editing.assign("exclusive")
     alone = editing.influence
-    assert alone is not None
     assert len(alone.vertices) < len(reach.vertices)
     editing.add_up("add")
     editing.fix(True)
-    assert editing.performance is not None
     assert not editing.performance.displacements[:, editing.performance.names.index("8.2")].any()
     editing.save()
     saved = read_mapping(editing.path or "")
@@ -209,8 +198,7 @@ def test_a_mapping_begun_by_hand_says_what_it_lacks(head: MarkedHead) -> None:
         assert vertex is not None
         editing.place(vertex)
     assert editing.performance is not None
-    assert editing.problem == ""
-    assert editing.mapping.fixed == ("11.1", "11.2", "11.3")
+    assert (editing.problem, editing.mapping.fixed) == ("", ("11.1", "11.2", "11.3"))
     editing.next_missing()
     assert editing.current not in editing.mapping.markers
     editing.fix(False)
@@ -231,50 +219,32 @@ def test_a_gap_hides_the_marker(editing: MarkerEditing, head: MarkedHead) -> Non
 
 
 def test_keys_of_the_window(on_display: str, editing: MarkerEditing) -> None:
-    try:
-        window = open_markers(editing, "face.csv on head.obj", size=SIZE)
-    except DisplayError as error:
-        graphics.skip(f"no window on the virtual display: {error}")
-
-    def press(key: int, modifiers: int = 0) -> None:
-        window.input.on_key(window._window, key, 0, glfw.PRESS, modifiers)
-
-    with window:
+    with or_skip(lambda: open_markers(editing, "face.csv on head.obj", size=SIZE)) as window:
         settle(window)
         editing.choose("8.2")
-        press(glfw.KEY_DOWN)
+        press(window, glfw.KEY_DOWN)
         assert editing.current == "8.3"
-        press(glfw.KEY_UP)
-        press(glfw.KEY_X)
+        press(window, glfw.KEY_UP)
+        press(window, glfw.KEY_X)
         assert editing.mapping.markers["8.2"].fixed
-        press(glfw.KEY_Z, glfw.MOD_CONTROL)
+        press(window, glfw.KEY_Z, glfw.MOD_CONTROL)
         assert not editing.mapping.markers["8.2"].fixed
-        press(glfw.KEY_O)
-        press(glfw.KEY_W)
+        press(window, glfw.KEY_O)
+        press(window, glfw.KEY_W)
         assert (editing.beside, editing.shows_weights) == (False, False)
-        press(glfw.KEY_SPACE)
+        press(window, glfw.KEY_SPACE)
         assert window.transport.playing
-        press(glfw.KEY_SPACE)
-        press(glfw.KEY_F2)  # panels of the player have no meaning here
+        press(window, glfw.KEY_SPACE)
+        press(window, glfw.KEY_F2)  # panels of the player have no meaning here
         assert window.session.open == {"markers"}
-        press(glfw.KEY_DELETE)
+        press(window, glfw.KEY_DELETE)
         assert "8.2" not in editing.mapping.markers
-        press(glfw.KEY_ENTER)
+        press(window, glfw.KEY_ENTER)
         assert editing.current == "8.2"
-        press(glfw.KEY_Q)
+        press(window, glfw.KEY_Q)
         assert not window.session.closing  # not saved
-        press(glfw.KEY_S, glfw.MOD_CONTROL)
+        press(window, glfw.KEY_S, glfw.MOD_CONTROL)
         assert "8.2" not in read_mapping(editing.path or "").markers
         settle(window)
-        press(glfw.KEY_Q)
+        press(window, glfw.KEY_Q)
         assert window.session.closing
-
-
-def test_without_a_display_it_says_how_to_do_without(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DISPLAY", ":990")
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(DisplayError, match=r"no window can be opened.*-o FILE.png"):
-        check_page("markers")
-    monkeypatch.setitem(sys.modules, "imgui_bundle", None)
-    with pytest.raises(DisplayError, match=r"imgui.*-o FILE.png"):
-        check_page("markers")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,10 +9,8 @@ import numpy as np
 import pytest
 
 import graphics
-from fba.errors import DisplayError
 from fba.face.fitting import Photograph, read_photo_points
-from fba_player.scene._photo_editing import PhotoEditing
-from fba_player.scene._photo_scene import PhotoScene
+from fba_player.scene._photo_scene import PhotoEditing, PhotoScene
 from fba_player.session._pages import PHOTOS
 from fba_player.session._session import Session
 from fba_player.view._geometry import project
@@ -21,7 +18,7 @@ from fba_player.view._geometry import project
 graphics.imported("glfw")
 graphics.imported("imgui_bundle")
 
-from fba_player.window.pages import check_page  # noqa: E402
+from studio_hand import StudioHand  # noqa: E402
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (640, 480)
@@ -55,31 +52,27 @@ def pixel_of(session: Session, item: str, spot: tuple[float, float]) -> tuple[fl
     return float(x), float(y)
 
 
-def drag(studio: Studio, start: tuple[float, float], end: tuple[float, float]) -> None:
-    for place, down in ((start, True), (end, False)):
-        studio.gui.io.add_mouse_pos_event(*place)
-        studio.draw(2)
-        studio.gui.io.add_mouse_button_event(0, down)
-        studio.draw(2)
-
-
 def test_points_are_dragged_and_clicks_place_them(studio: Studio) -> None:
     session, editing = studio.session, scene_of(studio.session).editing
     camera = session.viewpoint.camera
-    drag(studio, pixel_of(session, "front 9.3", (160, 220)), pixel_of(session, "front 9.3", (120, 260)))
+    StudioHand(studio).drag(
+        pixel_of(session, "front 9.3", (160, 220)), pixel_of(session, "front 9.3", (120, 260))
+    )
     assert editing.current == "front 9.3"
     assert editing.state["front 9.3"] == pytest.approx((120, 260), abs=1)
     assert session.viewpoint.camera == camera
     assert session.unsaved == {"the points"}
     editing.choose("side 2.10")
     at = pixel_of(session, "side 2.10", (100, 30))
-    drag(studio, at, at)
+    StudioHand(studio).drag(at, at)
     assert editing.state["side 2.10"] == pytest.approx((100, 30), abs=1)
     assert PHOTOS.press_key(session, "ctrl+z")
     assert "side 2.10" not in editing.state
     assert PHOTOS.press_key(session, "ctrl+z")
     assert editing.state["front 9.3"] == (160.0, 220.0)
-    drag(studio, pixel_of(session, "front 9.3", (40, 40)), pixel_of(session, "front 9.3", (60, 60)))
+    StudioHand(studio).drag(
+        pixel_of(session, "front 9.3", (40, 40)), pixel_of(session, "front 9.3", (60, 60))
+    )
     assert session.viewpoint.camera.target != camera.target  # the picture was moved, not turned
     assert session.viewpoint.camera.yaw == camera.yaw
     assert editing.state["front 9.3"] == (160.0, 220.0)
@@ -105,9 +98,3 @@ def test_points_are_saved(studio: Studio) -> None:
     assert PHOTOS.press_key(session, "space")
     assert editing.current in editing.missing
     assert not PHOTOS.press_key(session, "p")
-
-
-def test_without_a_window_the_file_s_format_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "imgui_bundle", None)
-    with pytest.raises(DisplayError, match=r"photos needs imgui.*write the file by hand"):
-        check_page("photos")

@@ -18,13 +18,14 @@ from fba_player.scene._placement_scene import CURRENT, PlacementScene
 from fba_player.scene._point_placement import PointPlacement
 from fba_player.session._session import Session
 from mesh_files import write_obj
-from open_windows import settle
+from open_windows import or_skip, press, settle
 from small_head import small_head
 
 glfw = graphics.imported("glfw")
 graphics.imported("imgui_bundle")
 
 from fba_player.window.pages import check_page, open_placement  # noqa: E402
+from studio_hand import StudioHand  # noqa: E402
 from tools.window_picture import Studio  # noqa: E402 - needs imgui
 
 SIZE = (640, 480)
@@ -62,28 +63,20 @@ def pixel_of(session: Session, name: str) -> tuple[float, float]:
     return float((seen[0] + 1) * SIZE[0] / 2), float((1 - seen[1]) * SIZE[1] / 2)
 
 
-def drag(studio: Studio, start: tuple[float, float], end: tuple[float, float]) -> None:
-    for place, down in ((start, True), (end, False)):
-        studio.gui.io.add_mouse_pos_event(*place)
-        studio.draw(2)
-        studio.gui.io.add_mouse_button_event(0, down)
-        studio.draw(2)
-
-
 def test_a_click_places_a_point_and_a_drag_turns_the_head(studio: Studio) -> None:
     session, placement = studio.session, placement_of(studio.session)
     placement.choose("9.3")
     at = pixel_of(session, "9.3")
     camera = session.viewpoint.camera
-    drag(studio, at, (at[0] + 2, at[1]))
+    StudioHand(studio).drag(at, (at[0] + 2, at[1]))
     assert placement.places["9.3"] == small_head().bound[point_rows()["9.3"]]
     assert session.viewpoint.camera == camera
     assert session.unsaved == {"the points"}
     before = dict(placement.places)
-    drag(studio, at, (at[0] + 40, at[1]))
+    StudioHand(studio).drag(at, (at[0] + 40, at[1]))
     assert session.viewpoint.camera.yaw < -5
     assert placement.places == before
-    drag(studio, (3, 3), (3, 3))  # beside the head
+    StudioHand(studio).drag((3, 3), (3, 3))  # beside the head
     assert placement.places == before
     assert "Click on the head" in session.notices()[-1].text
 
@@ -113,46 +106,38 @@ def test_the_list_stays_open(studio: Studio) -> None:
 
 def test_keys_work_through_the_points(on_display: str, surface: HeadSurface, tmp_path: Path) -> None:
     placement = PointPlacement(surface, tmp_path / "points.csv")
-    try:
-        window = open_placement(placement, size=SIZE)
-    except DisplayError as error:
-        graphics.skip(f"no window on the virtual display: {error}")
-
-    def press(key: int, modifiers: int = 0) -> None:
-        window.input.on_key(window._window, key, 0, glfw.PRESS, modifiers)
-
-    with window:
+    with or_skip(lambda: open_placement(placement, size=SIZE)) as window:
         settle(window)
         head = small_head().bound
         first = placement.names
-        press(glfw.KEY_DOWN)
+        press(window, glfw.KEY_DOWN)
         assert placement.current == first[1]
-        press(glfw.KEY_UP)
-        press(glfw.KEY_UP)
+        press(window, glfw.KEY_UP)
+        press(window, glfw.KEY_UP)
         assert placement.current == first[-1]
-        press(glfw.KEY_SPACE)
+        press(window, glfw.KEY_SPACE)
         assert placement.current == placement.missing[0]
         placement.choose("8.3")
         window.controls.press("left", *pixel_of(window.session, "8.3"))
         window.controls.release()
         assert placement.places["8.3"] == head[point_rows()["8.3"]]
-        press(glfw.KEY_M)
+        press(window, glfw.KEY_M)
         assert placement.places["8.4"] == head[point_rows()["8.4"]]
-        press(glfw.KEY_Z, glfw.MOD_CONTROL)
+        press(window, glfw.KEY_Z, glfw.MOD_CONTROL)
         assert "8.4" not in placement.places
-        press(glfw.KEY_M, glfw.MOD_CONTROL)
+        press(window, glfw.KEY_M, glfw.MOD_CONTROL)
         assert placement.places["8.4"] == head[point_rows()["8.4"]]
-        press(glfw.KEY_P)  # of the player, which has no meaning here
-        press(glfw.KEY_F2)
+        press(window, glfw.KEY_P)  # of the player, which has no meaning here
+        press(window, glfw.KEY_F2)
         assert window.session.open == {"points"}
-        press(glfw.KEY_Q)
+        press(window, glfw.KEY_Q)
         assert not window.session.closing  # not saved
-        press(glfw.KEY_S, glfw.MOD_CONTROL)
+        press(window, glfw.KEY_S, glfw.MOD_CONTROL)
         assert read_points(placement.path).vertices["8.4"] == head[point_rows()["8.4"]]
-        press(glfw.KEY_DELETE)
+        press(window, glfw.KEY_DELETE)
         assert "8.3" not in placement.places
-        press(glfw.KEY_Z, glfw.MOD_CONTROL)
-        press(glfw.KEY_Q)
+        press(window, glfw.KEY_Z, glfw.MOD_CONTROL)
+        press(window, glfw.KEY_Q)
         assert window.session.closing
         assert not window.update()
 
@@ -168,11 +153,21 @@ def test_an_unwritable_file_is_said_in_the_window(surface: HeadSurface, tmp_path
     assert not PLACING.press_key(session, "p")
 
 
-def test_without_a_display_the_file_s_format_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("subject", "instead"),
+    [
+        ("points", "lines 'name,vertex'.*'name,x,y,z'"),
+        ("markers", "-o FILE.png"),
+        ("photos", "write the file by hand"),
+    ],
+)
+def test_without_a_display_or_imgui_it_says_how_to_do_without(
+    monkeypatch: pytest.MonkeyPatch, subject: str, instead: str
+) -> None:
     monkeypatch.setenv("DISPLAY", ":990")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(DisplayError, match=r"no window can be opened.*lines 'name,vertex'.*'name,x,y,z'"):
-        check_page("points")
+    with pytest.raises(DisplayError, match=f"no window can be opened.*{instead}"):
+        check_page(subject)
     monkeypatch.setitem(sys.modules, "imgui_bundle", None)
-    with pytest.raises(DisplayError, match=r"imgui.*lines 'name,vertex'"):
-        check_page("points")
+    with pytest.raises(DisplayError, match=f"{subject} needs imgui.*{instead}"):
+        check_page(subject)

@@ -20,10 +20,9 @@ from fba_player.scene.scene import Scene
 from fba_player.session._memory import Memory
 from fba_player.session._session import Notice
 from fba_player.session._source import Source
-from fba_player.window._opening import ACCENT, opening_picture
 from fba_player.window._play import play
 from fba_player.window._window import Window
-from fba_player.window.surface import COMPILING, FUNCTIONS_TOLD, Surface
+from fba_player.window.surface import ACCENT, COMPILING, FUNCTIONS_TOLD, Surface, opening_picture
 
 SOUND = files("fba") / "samples" / "hello.wav"
 
@@ -138,7 +137,6 @@ def test_a_file_that_changes_is_shown_again_where_it_was(
     options = {"surface": surface, "file": talk, "paused": True, "audio": SOUND}
     assert played(monkeypatch, fba.read(talk), edit, **options) == (talk,)
     state = surface.resumed
-    assert state is not None
     assert state.time == pytest.approx(0.2)
 
     def look(window: Window) -> None:

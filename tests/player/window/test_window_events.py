@@ -197,8 +197,7 @@ def test_pictures_and_films_are_kept(window: Window, hand: Hand, tmp_path: Path)
 
     hand.key("F12", (tmp_path / "long-0000.png").exists)
     with Image.open(tmp_path / "long-0000.png") as picture:
-        assert picture.size == (900, 600)
-        assert picture.mode == "RGB"
+        assert (picture.size, picture.mode) == ((900, 600), "RGB")
     hand.key("shift+F12", (tmp_path / "long-0000-2.png").exists)
     with Image.open(tmp_path / "long-0000-2.png") as picture:
         alpha = np.asarray(picture)[..., 3]

@@ -13,13 +13,12 @@ import graphics
 from fba.animation import Animation
 from fba.body import gait
 from fba.codec import Decoder
-from fba.errors import DisplayError
 from fba_player.playback.live import LiveAnimation, LiveTimeline
 from fba_player.scene.compare import CompareScene
 from fba_player.scene.scene import Scene
 from fba_player.view.protocols import Showable
 from fba_player.window._window import Window
-from open_windows import settle, shown, until
+from open_windows import or_skip, settle, shown, until
 from player_tracks import face_track
 
 graphics.imported("glfw")
@@ -27,10 +26,7 @@ graphics.imported("imgui_bundle")
 
 
 def window_of(scene: Showable, folder: Path) -> Window:
-    try:
-        return Window(scene, size=(480, 320), folder=folder, loop=False)
-    except DisplayError as error:
-        graphics.skip(f"no window on the virtual display: {error}")
+    return or_skip(lambda: Window(scene, size=(480, 320), folder=folder, loop=False))
 
 
 def test_a_stream_is_shown_while_it_arrives(on_display: str, tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ import numpy as np
 
 from fba.arrays import Float64
 from fba.errors import FormatError
-from fba.formats.numpy_archives import read_arrays
+from fba.formats.zip_files import read_arrays
 from fba.limits import DEFAULT_LIMITS, Limits
 from fba.persona.points import fit_face_points
 from fba.persona.points.layout import OUTLINE, REGISTERED, SAME, TRACKED, compute_vertices, standard_points

@@ -18,7 +18,7 @@ import numpy as np
 
 from fba.arrays import Bool, Float64
 from fba.capture import ActionUnitMotion, ShapeMotion, from_blendshapes
-from fba.capture.blendshapes.action_units import to_shapes
+from fba.capture.blendshapes.conversion import to_shapes
 from fba.face import Definitions, resolve
 from fba.parameters import FAP_COUNT
 from fba.persona.points.layout import PARTS

@@ -19,11 +19,20 @@ from fba.cli.coding.clamped_values import clamped_lines
 from fba.cli.command import Command, examples
 from fba.cli.inputs import read_model
 from fba.cli.interruptions import raise_delayed, stopping
-from fba.cli.live_streams import ADDRESSES, DESCRIPTION, Receiving, SourceType, network_source
+from fba.cli.live_streams import (
+    ADDRESSES,
+    DESCRIPTION,
+    HOST_HELP,
+    INTRA_PERIOD,
+    Receiving,
+    SourceType,
+    StreamTarget,
+    network_source,
+    open_server,
+)
 from fba.cli.option_fields import option, option_like, with_options
 from fba.cli.outputs import STANDARD, Output, Outputs, display_name, output_option
 from fba.cli.printing import rate_text, seconds_text
-from fba.cli.web_server import HOST_HELP, INTRA_PERIOD, StreamTarget, open_server
 from fba.encoder_options import QUANT_MAX, EncoderOptions
 from fba.errors import FbaError, did_you_mean
 

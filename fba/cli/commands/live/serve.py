@@ -13,9 +13,8 @@ from fba.cli import live_streams
 from fba.cli.command import STANDARD_INPUT, Command, examples
 from fba.cli.inputs import Reading
 from fba.cli.interruptions import raise_delayed, stopping
-from fba.cli.live_streams import Receiving
+from fba.cli.live_streams import HOST_HELP, Receiving, open_server
 from fba.cli.option_fields import group, option, with_options
-from fba.cli.web_server import HOST_HELP, open_server
 
 if TYPE_CHECKING:
     from collections.abc import Callable

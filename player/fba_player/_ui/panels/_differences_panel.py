@@ -11,7 +11,7 @@ from imgui_bundle import imgui, implot
 from fba.arrays import Float64
 from fba_player._ui import theme
 from fba_player._ui.panels.panel import Panel, choose_by_button, choose_name, heading, tooltip
-from fba_player.scene._differences import Differences, Largest
+from fba_player.scene._compare_timeline import Differences, Largest
 from fba_player.scene.compare import CompareScene
 from fba_player.session._session import Session
 

@@ -20,7 +20,7 @@ from fba_player._ui.panels.panel import (
     tooltip,
     wrapped,
 )
-from fba_player.scene._photo_editing import PhotoEditing
+from fba_player.scene._photo_scene import PhotoEditing
 from fba_player.scene._point_placement import MATES, PointPlacement, describe_point
 from fba_player.scene.marker_editing import MarkerEditing
 from fba_player.session._pages import (

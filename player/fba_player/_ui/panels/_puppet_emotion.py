@@ -12,8 +12,7 @@ from fba.emotion.plane import SCALE_MAX, SCALE_MIN
 from fba.parameters import EXPRESSIONS, INTENSITY_MAX, VISEMES
 from fba_player._ui import theme
 from fba_player._ui.panels.panel import choose_name, heading, shorten, tooltip, wrapped
-from fba_player.session._mood import PuppetMood
-from fba_player.session._puppet import Expression, Viseme
+from fba_player.session._puppet import Expression, PuppetMood, Viseme
 from fba_player.session.performer import Performer
 from fba_player.view._geometry import Box, overlap
 

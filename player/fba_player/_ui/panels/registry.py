@@ -6,10 +6,9 @@ from fba_player._ui.panels._curves_panel import CurvesPanel
 from fba_player._ui.panels._differences_panel import DifferencesPanel
 from fba_player._ui.panels._file_panel import FilePanel
 from fba_player._ui.panels._files_panel import FilesPanel
-from fba_player._ui.panels._help_panel import HelpPanel
 from fba_player._ui.panels._page_panels import MarkersPanel, PhotosPanel, PointsPanel
 from fba_player._ui.panels._rate_panel import RatePanel
-from fba_player._ui.panels._view_panel import CameraPanel, ViewPanel
+from fba_player._ui.panels._view_panel import CameraPanel, HelpPanel, ViewPanel
 from fba_player._ui.panels.panel import Panel
 from fba_player._ui.panels.puppet_panel import PuppetPanel
 
