@@ -243,6 +243,12 @@ ROWS = (
         "player/test_player.py::test_pictures[face]",
     ),
     Row(
+        "pictures of eight persons side by side",
+        PICTURES,
+        "{processor:.1f} ms of processor each; {pictures:.0f} a second by the clock",
+        "player/test_player.py::test_pictures[eight persons]",
+    ),
+    Row(
         "pictures of the person into an MP4 file",
         FILM,
         "{processor:.1f} ms of processor each; {pictures:.0f} a second by the clock",

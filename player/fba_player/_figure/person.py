@@ -40,8 +40,10 @@ NEARER = 1.5
 """A face's levels of detail are at hand this many times nearer than they are drawn: they change gradually."""
 MOST_MOVERS = 8
 """How many choices of vertices are kept, a few megabytes each."""
-WITHIN_LIPS, SHUT_PIXELS = ("teeth", "tongue"), 0.5
+WITHIN_LIPS, SHUT_PIXELS = ("teeth", "tongue"), 1.0
 """Kinds of a face's parts that are left out where its lips are closer than this number of pixels."""
+SMALL = 0.005
+"""Width (m) of a pixel on a head from which hardly anything is seen of lashes and wrinkles: it has none."""
 CARRIED = ("skin", "mouth", "hair", "other")
 """Kinds of a face's parts that the neck may bend; eyes, teeth and tongue move with the skull."""
 
@@ -121,25 +123,20 @@ class Person:
         ]
         if movers.head is None:
             return meshes
-        pose = self.figure.pose(faps, movers.face, self._least_gap(joints, seen))
+        away = 0.0 if seen is None else np.linalg.norm(joints[skull_of(self.body), :3, 3] - seen.eye)
+        pixel = 0.0 if seen is None else float(seen.pixel * away)  # its width on the head, m
+        pose = self.figure.pose(faps, movers.face, SHUT_PIXELS * pixel)
         positions, normals = np.empty_like(pose.positions), np.empty_like(pose.positions)
         movers.head.skin(pose.positions, joints, positions, local_normals=pose.normals, normals=normals)
         light = movers.light.shade(pose.positions, np.eye(3), self.frame(joints)[:3, :3])
-        wrinkles = wrinkle_strengths(faps)
+        wrinkles = wrinkle_strengths(faps) if pixel < SMALL else None
         for name, shape in self.face_shapes.items():
-            if pose.shut and shape.kind in WITHIN_LIPS:
+            if (pose.shut and shape.kind in WITHIN_LIPS) or (pixel >= SMALL and shape.kind == "lash"):
                 continue
             rows = self.figure.rows(name)
             more = {"wrinkles": wrinkles, "finest": movers.finest}
             meshes.append(_mesh_in_world(shape, rows, positions, normals, light, **more))
         return meshes
-
-    def _least_gap(self, joints: Float64, seen: Seen | None) -> float:
-        """Return how far apart (m) lips must be for something to be seen between them from there."""
-        if seen is None:
-            return 0.0
-        away = np.linalg.norm(joints[skull_of(self.body), :3, 3] - seen.eye)
-        return float(SHUT_PIXELS * seen.pixel * away)
 
     def _choose_movers(self, joints: Float64, seen: Seen | None) -> Movers:
         """Return what moves the vertices of all levels of detail that may be drawn from there."""
@@ -249,7 +246,9 @@ def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]
         coarse = cast_coarsely(shape, part, stored)
         visible = keep_triangles(coarse, ~head.hidden[figure.rows(name)], whole=False)
         if len(visible.triangles):
-            shapes[name] = visible
+            whole = head.brings_neck and part.kind == "skin"
+            levels = tuple(replace(n, shape=replace(n.shape, closed=whole)) for n in visible.levels)
+            shapes[name] = replace(visible, levels=levels)
     return shapes
 
 

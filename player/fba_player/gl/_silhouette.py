@@ -53,7 +53,11 @@ def find_edges(triangles: Int32) -> Edges:
 
 def _find_constants(shape: FaceShape) -> tuple[Edges, Float32]:
     """Return the edges of a shape, and a copy of its sway, as of its triangles."""
-    return find_edges(shape.triangles), np.array(shape.sway, dtype=np.float32, order="C")
+    triangles = shape.triangles
+    if shape.points is not None:  # seams of its picture are no edges of the surface
+        _, first, same = np.unique(shape.points, axis=0, return_index=True, return_inverse=True)
+        triangles = first[same.ravel()][triangles].astype(np.int32)
+    return find_edges(triangles), np.array(shape.sway, dtype=np.float32, order="C")
 
 
 class Outliner:
