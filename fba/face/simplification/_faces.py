@@ -48,7 +48,7 @@ lids closed with a broad grin, the lips apart with wide eyes, and the lips pushe
 and lids that meet half way."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-IMPORTANCE = 140.0
+IMPORTANCE = 190.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
 LID_SHARE = 7.0
@@ -133,13 +133,16 @@ class FaceSimplification:
         return DetailLevel(face, level.parents, off, shape_key(model.parts))
 
     def _mend(self, face: FaceModel, level: Level) -> FaceModel:
-        """Return the face with other tables for FAPs whose own break rules: with lids that meet, carried, or
-        from the mesh."""
+        """Return the face with other tables for FAPs whose own break rules: stopped earlier where that is
+        enough, else with lids that meet, carried, or from the mesh."""
         poser, faps = Poser(face), [table.fap for table in face.tables]
         if not count_errors(poser, faps):
             return face
-        lids = tuple(table for table in self.model.tables if table.fap in LID_FAPS)
         bare = replace(face, tables=())
+        stopped = repair_tables(face, bare)
+        if stopped.table_of.keys() == face.table_of.keys() and not count_errors(Poser(stopped), faps):
+            return stopped
+        lids = tuple(table for table in self.model.tables if table.fap in LID_FAPS)
         model, still = self.model.with_tables(lids, {}), self._unmoved(level)
         carried = fit_tables(model, bare, level, still, self.mesh.positions, carried=True)
         plain = author(face.parts, face.points, bound=face.bound)

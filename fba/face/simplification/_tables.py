@@ -25,7 +25,7 @@ from fba.face.authoring.surface._motion import (
     split_by_part,
     unfold,
 )
-from fba.face.authoring.surface._motion_limits import stop_at_folds
+from fba.face.authoring.surface._motion_limits import stop_motion
 from fba.face.authoring.surface.landmarks import CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface, vertices_of_kinds
 from fba.face.checks._combined_rules import CLOSED, MAX_LID_GAP, SIDES, SPLITS, lid_gap
@@ -53,8 +53,6 @@ OUTSIDE_RADII = 0.97
 """Triangles whose corners at rest are this far out, in radii of the eyeball, may not cut it."""
 LIFTS = 30
 """Rounds in which lids are lifted off the eyeball: lifting one triangle tilts its neighbours."""
-ROUNDS = 4
-"""Rounds in which lids are lifted off the eyeball and folds taken out of them."""
 MOST_LIFT = 1.0
 """Largest lift, as a share of the eyeball's radius."""
 SAMPLES = np.array([(0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (1 / 3, 1 / 3, 1 / 3), *np.eye(3)])
@@ -182,7 +180,7 @@ class _Fit:
         self.places = level.positions[first]
         down = np.repeat(np.arange(count), 3)
         beside = (down, level.rows[first].ravel())
-        self._carried = coo_array((level.weights[first].ravel(), beside), shape=(count, self._total)).tocsr()
+        self._carried = coo_array((level.weights[first].ravel(), beside), shape=(count, self._total)).tocsc()
         self._still, self.fixed = still, self.point[level.parents[still]]
         self._free = np.setdiff1d(np.arange(count), self.fixed)
         normal = (self._spread.T @ self._spread + SMOOTHING * eye_array(count)).tocsr()
@@ -194,14 +192,15 @@ class _Fit:
 
         carried: whether they are the interpolated ones.
         """
-        intervals = len(mesh.borders) - 1
-        moves = np.zeros((self._total, 3 * intervals))
-        moves[mesh.vertices + start] = mesh.displacements.reshape(-1, 3 * intervals)
-        near = self._carried @ moves
+        intervals, moved = len(mesh.borders) - 1, mesh.vertices + start
+        moves = mesh.displacements.reshape(-1, 3 * intervals).astype(np.float64)
+        near = self._carried[:, moved] @ moves
         fitted = near.copy() if carried else np.zeros_like(near)
-        fitted[self.fixed] = moves[self._still]
+        row = np.full(self._total, len(moved))  # of what does not move
+        row[moved] = np.arange(len(moved))
+        fitted[self.fixed] = np.vstack([moves, np.zeros_like(moves[:1])])[row[self._still]]
         if self._solver is not None and not carried:
-            right = self._spread.T @ moves + SMOOTHING * near
+            right = self._spread[moved].T @ moves + SMOOTHING * near
             fitted[self._free] = self._solver.solve(right[self._free] - self._beside @ fitted[self.fixed])
         fitted[~near.any(axis=1)] = 0.0  # what the full face does not move there
         fitted = fitted.reshape(-1, intervals, 3)
@@ -271,20 +270,27 @@ class _Easing:
         """Return the motion without folds; None if it has none."""
         surface, limiter = self._of(part)
         motion, turning = self._motion(fap, borders, moves, unit), fap in TURNING
-        if _is_sound(limiter, motion, turning):
+        if (_folded_shares(limiter, motion, turning) <= _most_folded(turning)).all():
             return None
-        motion = self._unfold(surface, limiter, motion, fap)
-        motion = stop_at_folds(limiter, motion, turning=turning)
+        motion = _stop(limiter, self._unfold(surface, limiter, motion, fap), turning)
         return _go_on(motion, borders, moves, unit)
 
     def _unfold(self, surface: Surface, limiter: Limiter, motion: Motion, fap: int) -> Motion:
         """Return the motion with folds stretched evenly, where need be even where it should not change."""
-        outside = self._outside(fap)
-        for pinned in (self._fit.fixed, self._own_points(fap)):
-            eased = _unfold_each(surface, limiter, motion, surface.mask(pinned) | outside, fap in TURNING)
-            if _is_sound(limiter, _moving(eased), fap in TURNING):
-                break
-        return eased
+        turning, outside = fap in TURNING, self._outside(fap)
+        held = [surface.mask(points) | outside for points in (self._fit.fixed, self._own_points(fap))]
+        shifts = np.stack([limiter.spread(motion.vertices, step) for step in motion.shifts])
+        folded, zero = _folded_shares(limiter, motion, turning), int(np.flatnonzero(motion.values == 0)[0])
+        for side in (range(zero + 1, len(shifts)), range(zero - 1, -1, -1)):
+            for k in side:
+                step = shifts[k]
+                for pinned in held:
+                    if folded[k] > 0.0:
+                        shifts[k], folded[k] = _unfold_one(surface, limiter, step, pinned, turning)
+                if folded[k] > _most_folded(turning):
+                    break  # the motion will stop there
+        vertices = np.flatnonzero(shifts.any(axis=(0, 2)))
+        return Motion(motion.values, vertices, shifts[:, vertices])
 
     def _own_points(self, fap: int) -> Intp:
         """Return the points whose motion must be right: the FAP's own, its mate's, those of lines."""
@@ -311,15 +317,16 @@ class _Easing:
         limiter = limiter.without(self._corners(side))
         motion = self._motion(fap, borders, moves, unit)
         pinned = surface.mask(self._on_lines) | self._outside(fap)
-        for _ in range(ROUNDS):
+        left, before = len(motion.values), len(motion.values) + 1  # values at which triangles are folded
+        while 0 < left < before:
             motion = self._unfold(surface, limiter, motion, fap)
             if eye.measured and not eye.flat:
                 motion = lift_off(measure_profile(eye, self._face.parts, 0.0), surface, motion, pinned)
-            if _is_sound(limiter, _moving(motion), True):
-                break
+            shares = _folded_shares(limiter, _moving(motion), True)
+            left, before = int((shares > MAX_TURNED_SHARE).sum()), left
         motion = _moving(motion)
-        if not _is_sound(limiter, motion, True):
-            motion = stop_at_folds(limiter, motion, turning=True)
+        if left:
+            motion = _stop(limiter, motion, True)
         return _go_on(motion, borders, moves, unit)
 
     @cached_property
@@ -355,32 +362,47 @@ def _go_on(motion: Motion, borders: Int32, moves: Float64, unit: float) -> Motio
     return Motion(values, motion.vertices, np.array(shifts))
 
 
-def _unfold_each(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, turning: bool) -> Motion:
-    """Return the motion unfolded value by value: in each, what moves then is judged, as by the checks."""
-    shifts = np.zeros((len(motion.values), len(surface), 3))
-    for k, shift in enumerate(motion.shifts):
-        moved = shift.any(axis=1)
-        step = np.stack([0 * shift[moved], shift[moved]])
-        alone = Motion(np.array([0.0, 1.0]), motion.vertices[moved], step)
-        alone = unfold(surface, limiter, alone, pinned, turning)
-        shifts[k, alone.vertices] = alone.shifts[1]
-    vertices = np.flatnonzero(shifts.any(axis=(0, 2)))
-    return Motion(motion.values, vertices, shifts[:, vertices])
+def _unfold_one(
+    surface: Surface, limiter: Limiter, shift: Float64, pinned: Bool, turning: bool
+) -> tuple[Float64, float]:
+    """Return the shifts (N, 3) of one value unfolded, and the share of folds left: what moves then is judged,
+    as by the checks."""
+    moved = np.flatnonzero(shift.any(axis=1))
+    step = np.stack([0 * shift[moved], shift[moved]])
+    alone = unfold(surface, limiter, Motion(np.array([0.0, 1.0]), moved, step), pinned, turning)
+    return limiter.spread(alone.vertices, alone.shifts[1]), float(_folded_shares(limiter, alone, turning)[1])
 
 
-def _is_sound(limiter: Limiter, motion: Motion, turning: bool) -> bool:
-    """Return whether no shift folds more, of what moves in it, than the checks allow."""
-    for step in motion.shifts:
-        shift = limiter.spread(motion.vertices, step)
-        patch = limiter.patch(np.flatnonzero(shift.any(axis=1)))
-        folded = patch.areas[~patch.soundness(shift, turning=turning)].sum()
-        if folded > (MAX_TURNED_SHARE if turning else 0.0) * patch.areas.sum():
-            return False
-    return True
+def _most_folded(turning: bool) -> float:
+    """Return the share of the moving area that the checks allow to fold."""
+    return MAX_TURNED_SHARE if turning else 0.0
+
+
+def _folded_shares(limiter: Limiter, motion: Motion, turning: bool) -> Float64:
+    """Return (K,): the share of the area of what moves at each value that is folded."""
+    shares, before = np.zeros(len(motion.values)), np.zeros(0, dtype=bool)
+    for k, step in enumerate(motion.shifts):
+        moved = step.any(axis=1)
+        if not np.array_equal(moved, before):  # mostly, all values move the same vertices
+            patch, before = limiter.patch(motion.vertices[moved]), moved
+        fine = patch.soundness(limiter.spread(motion.vertices, step), turning=turning)
+        if not fine.all():
+            shares[k] = patch.areas[~fine].sum() / patch.areas.sum()
+    return shares
+
+
+def _stop(limiter: Limiter, motion: Motion, turning: bool) -> Motion:
+    """Return the motion, stopped where more folds than the checks allow."""
+
+    def is_sound(shifts: Float64) -> bool:
+        once = Motion(np.zeros(1), motion.vertices, shifts[None])
+        return bool(_folded_shares(limiter, once, turning)[0] <= _most_folded(turning))
+
+    return stop_motion(motion, is_sound)
 
 
 def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -> Motion:
-    """Return the motion of a lid, lifted forwards where its triangles would cut deeper than before.
+    """Return the motion of a lid, lifted off the eyeball where its triangles would cut deeper than before.
 
     pinned: (N,) mask of vertices whose shifts must not change, as those of margins, which meet others.
     """
@@ -396,9 +418,10 @@ def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -
     shifts[:, motion.vertices] = motion.shifts
     for k in np.flatnonzero(motion.values > 0):
         lifted = np.zeros(len(before))
+        outward = before + shifts[k] - profile.centre
+        outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-30)
         for _ in range(LIFTS):
-            now = (before + shifts[k])[triangles]
-            now[:, :, 2] += lifted[triangles]
+            now = (before + shifts[k] + lifted[:, None] * outward)[triangles]
             deep = _depth(profile, now) - was
             deep[np.einsum("sk,fk->fs", SAMPLES, now[:, :, 2]) < profile.centre[2]] = 0.0
             push = np.where(moves, deep, 0.0).max(axis=1, initial=0.0)
@@ -407,7 +430,7 @@ def lift_off(profile: Profile, surface: Surface, motion: Motion, pinned: Bool) -
             more = np.zeros(len(before))
             np.maximum.at(more, triangles[free], np.repeat(push[:, None], 3, axis=1)[free])
             lifted = np.minimum(lifted + more, MOST_LIFT * profile.size)
-        shifts[k, :, 2] += lifted
+        shifts[k] += lifted[:, None] * outward
     vertices = np.flatnonzero(shifts.any(axis=(0, 2)))
     return Motion(motion.values, vertices, shifts[:, vertices])
 

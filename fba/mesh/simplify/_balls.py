@@ -60,7 +60,12 @@ def cut_depth(ball: Float64, rest: Float64, moved: Float64) -> float:
 
 
 @compiled
-def is_near(ball: Float64, point: Float64) -> bool:
-    """Return whether a point (3,) is near a ball."""
-    x, y, z = point[0] - ball[0], point[1] - ball[1], point[2] - ball[2]
-    return bool(x * x + y * y + z * z < (NEAR * ball[6]) ** 2)
+def is_near(balls: Float64, ball: int, places: Float64, v: int) -> bool:
+    """Return whether a vertex, of places (V, K, 3), is near a ball in any pose."""
+    for k in range(places.shape[1]):
+        squared = 0.0
+        for i in range(3):
+            squared += (places[v, k, i] - balls[ball, i]) ** 2
+        if squared < (NEAR * balls[ball, 6]) ** 2:
+            return True
+    return False

@@ -177,7 +177,9 @@ def simplify(
     welded[points] = places.transpose(1, 0, 2)
     surface = loops.Surface(
         welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
-        kind, np.zeros(total, np.int64), weight, through, *_measure_lines(welded[:, 0], whole, through),
+        kind, np.zeros((total, len(places), 6)), np.zeros((total, 3)), np.zeros(total, np.int32),
+        np.zeros(total, np.int64), np.zeros(total, np.int64), weight, through,
+        *_measure_lines(welded[:, 0], whole, through),
         part, np.bincount(part, minlength=1).astype(np.int32), _check_balls(balls),
     )  # fmt: skip
     history, scratch = _allocate(total, number, len(places))
@@ -251,7 +253,7 @@ def _allocate(vertices: int, wedges: int, poses: int) -> tuple[Any, Any]:
     )  # fmt: skip
     scratch = loops.Scratch(
         np.empty(2 * loops.MAX_RING, np.int32), np.empty(4 * loops.MAX_RING + 4, np.int32),
-        np.empty((poses, 13)), np.empty((3, 4)), np.empty(3), np.empty(1),
+        np.empty((poses, 13)), np.empty(9), np.empty((3, 4)), np.empty((3, 3)), np.empty(3), np.empty(1),
         np.full(vertices, np.inf), np.zeros(vertices, np.int32),
     )  # fmt: skip
     return history, scratch
@@ -409,8 +411,9 @@ def _kinds(triangles: Int32, wedges: Int32, count: int) -> Int32:
     line = (times == 1) | (sides[one] != sides[other]).any(axis=1)
     lines = np.bincount(ends[one[line]].ravel(), minlength=count)
     crowded = np.bincount(ends[one[times > 2]].ravel(), minlength=count) > 0
-    pairs = np.unique(np.stack([triangles.ravel(), wedges.ravel()], axis=1), axis=0)
-    parts = np.bincount(pairs[:, 0], minlength=count)
+    most = int(wedges.max(initial=0)) + 1
+    pairs = np.unique(triangles.ravel().astype(np.int64) * most + wedges.ravel())
+    parts = np.bincount(pairs // most, minlength=count)
     kind = np.full(count, loops.FREE, dtype=np.int32)
     kind[lines > 0] = loops.ON_LINE
     kind[(lines == 1) | (lines > 2) | crowded | (parts > 2) | ((lines == 0) & (parts > 1))] = loops.PINNED
@@ -424,7 +427,8 @@ def _measure_lines(places: Float64, triangles: Int32, lines: Int64) -> tuple[Int
     """
     count = int(lines.max(initial=0)).bit_length()
     ends, left, longest = np.full((count, 2), -1, np.int32), np.zeros(count, np.int32), np.zeros(count)
-    edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges = np.unique(np.sort(sides[(lines[sides] > 0).all(axis=1)], axis=1), axis=0)
     for line in range(count):
         on = (lines >> line & 1).astype(bool)
         one, other = edges[on[edges].all(axis=1)].T

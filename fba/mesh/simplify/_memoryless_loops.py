@@ -46,7 +46,9 @@ class Surface(NamedTuple):
 
     places: float64 (V, K, 3), vertices in all poses, at rest first. triangles, wedges: int32 (F, 3), vertices
     and wedges of each corner; the first corner is -1 once the triangle is gone. first, follow: (V,) and
-    (3 F,), the corners of each vertex as a linked list. kind: (V,). version: (V,), counts changes nearby.
+    (3 F,), the corners of each vertex as a linked list. kind: (V,). squares, normals, own: (V, K, 6), (V, 3)
+    and (V,), around each vertex the summed squares n n' of the normals, their sum at rest, and their number.
+    joined, changed: (V,), collapses done when another vertex joined each, or something around it changed.
     importance: (V,), factors of the cost. lines: (V,), a bit for each line through a vertex that is kept.
     ends: int32 (L, 2), the first and the last vertex of each line, -1 for a line that need not stay the
     shortest way between them. left, longest: int32 and float64 (L,), vertices left, and the first length.
@@ -60,7 +62,11 @@ class Surface(NamedTuple):
     first: Int32
     follow: Int32
     kind: Int32
-    version: Int64
+    squares: Float64
+    normals: Float64
+    own: Int32
+    joined: Int64
+    changed: Int64
     importance: Float64
     lines: Int64
     ends: Int32
@@ -89,14 +95,17 @@ class History(NamedTuple):
 
 class Scratch(NamedTuple):
     """ring, near: int32, triangles and vertices around an edge. sums: (K, 13), of each pose: the quadratic as
-    A (6), b (3), c, and the motion of one end relative to the other (3). planes: (3, 4), normals and right
-    sides. place: (3,), relative to one end. squared: (1,), the sum of the squared normals of the ring. reach,
-    steps: float64, infinite between uses, and int32 (V,), how far vertices are, by how many of a line."""
+    A (6), b (3), c, and the motion of one end relative to the other (3). total: (9,), A and b of their sum.
+    planes, rows: (3, 4), normals and right sides, and (3, 3), directions in which a minimum is sought. place:
+    (3,), relative to one end. squared: (1,), the sum of the squared normals of the ring. reach, steps:
+    float64, infinite between uses, and int32 (V,), how far vertices are, by how many of a line."""
 
     ring: Int32
     near: Int32
     sums: Float64
+    total: Float64
     planes: Float64
+    rows: Float64
     place: Float64
     squared: Float64
     reach: Float64
@@ -105,17 +114,62 @@ class Scratch(NamedTuple):
 
 @compiled
 def link_corners(surface: Surface) -> None:
-    """Write the lists of corners."""
+    """Write the lists of corners, and what is around each vertex."""
     for c in range(3 * len(surface.triangles) - 1, -1, -1):
         v = surface.triangles[c // 3, c % 3]
         surface.follow[c] = surface.first[v]
         surface.first[v] = c
+    for v in range(len(surface.first)):
+        _look_around(surface, v)
 
 
 @inlined
-def _corner_of(triangle: Int32, v: int) -> int:
+def _normal(surface: Surface, t: int, k: int) -> tuple[float, float, float]:
+    """Return the normal of a triangle in a pose, twice as long as the triangle is large."""
+    places = surface.places
+    p, q, r = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
+    ox, oy, oz = places[p, k, 0], places[p, k, 1], places[p, k, 2]
+    ex, ey, ez = places[q, k, 0] - ox, places[q, k, 1] - oy, places[q, k, 2] - oz
+    fx, fy, fz = places[r, k, 0] - ox, places[r, k, 1] - oy, places[r, k, 2] - oz
+    return ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
+
+
+@inlined
+def _add_square(sums: Float64, k: int, x: float, y: float, z: float, weight: float) -> None:
+    """Add weight times the square n n' of a normal."""
+    sums[k, 0] += weight * x * x
+    sums[k, 1] += weight * x * y
+    sums[k, 2] += weight * x * z
+    sums[k, 3] += weight * y * y
+    sums[k, 4] += weight * y * z
+    sums[k, 5] += weight * z * z
+
+
+@compiled
+def _look_around(surface: Surface, v: int) -> None:
+    """Write the normals around a vertex, their squares and their number."""
+    squares, normals = surface.squares[v], surface.normals[v]
+    squares[:] = 0.0
+    normals[:] = 0.0
+    surface.own[v] = 0
+    c = surface.first[v]
+    while c >= 0:
+        if surface.triangles[c // 3, 0] >= 0:
+            surface.own[v] += 1
+            for k in range(len(squares)):
+                x, y, z = _normal(surface, c // 3, k)
+                _add_square(squares, k, x, y, z, 1.0)
+                if k == 0:
+                    normals[0] += x
+                    normals[1] += y
+                    normals[2] += z
+        c = surface.follow[c]
+
+
+@inlined
+def _corner_of(triangles: Int32, t: int, v: int) -> int:
     """Return which corner of a triangle is v, -1 for none."""
-    return 0 if triangle[0] == v else (1 if triangle[1] == v else (2 if triangle[2] == v else -1))
+    return 0 if triangles[t, 0] == v else (1 if triangles[t, 1] == v else (2 if triangles[t, 2] == v else -1))
 
 
 @compiled
@@ -127,12 +181,11 @@ def _find_ring(surface: Surface, a: int, b: int, ring: Int32) -> int:
         c = surface.first[v]
         while c >= 0:
             t = c // 3
-            triangle = surface.triangles[t]
-            if triangle[0] >= 0:
+            if surface.triangles[t, 0] >= 0:
                 own += 1
                 if own > MAX_RING:
                     return -1
-                if v == a or _corner_of(triangle, a) < 0:
+                if v == a or _corner_of(surface.triangles, t, a) < 0:
                     ring[count] = t
                     count += 1
             c = surface.follow[c]
@@ -149,7 +202,7 @@ def _is_line(surface: Surface, a: int, b: int) -> bool:
     c = surface.first[a]
     while c >= 0:
         t = c // 3
-        k = _corner_of(triangles[t], b)
+        k = _corner_of(triangles, t, b)
         if triangles[t, 0] >= 0 and k >= 0:
             if count == 0:
                 one, two = wedges[t, c % 3], wedges[t, k]
@@ -197,33 +250,53 @@ def _add_line(surface: Surface, a: int, v: int, w: int, weight: float, sums: Flo
 
 
 @compiled
-def _sum_changes(surface: Surface, a: int, b: int, count: int, scratch: Scratch) -> float:
+def _sum_changes(surface: Surface, a: int, b: int, scratch: Scratch) -> float:
     """Write the quadratics of an edge's cost, of positions relative to a, and the normal of the plane of
-    equal volume, planes[0, :3]; return that plane's right side."""
-    places, triangles = surface.places, surface.triangles
-    sums, planes = scratch.sums, scratch.planes
-    sums[:] = 0.0
-    planes[:] = 0.0
-    volume = 0.0
-    scratch.squared[0] = 0.0
-    for k in range(places.shape[1]):
-        ox, oy, oz = places[a, k, 0], places[a, k, 1], places[a, k, 2]
-        for i in range(count):
-            p, q, r = triangles[scratch.ring[i]]
-            px, py, pz = places[p, k, 0] - ox, places[p, k, 1] - oy, places[p, k, 2] - oz
-            ex, ey, ez = places[q, k, 0] - ox - px, places[q, k, 1] - oy - py, places[q, k, 2] - oz - pz
-            fx, fy, fz = places[r, k, 0] - ox - px, places[r, k, 1] - oy - py, places[r, k, 2] - oz - pz
-            x, y, z = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
-            d = x * px + y * py + z * pz
-            _add_quadratic(sums, k, x, y, z, d, SURFACE_SHARE / 36)
-            if k == 0:
-                planes[0, 0] += x
-                planes[0, 1] += y
-                planes[0, 2] += z
-                volume += d
-                scratch.squared[0] += x * x + y * y + z * z
+    equal volume, planes[0, :3]; return that plane's right side.
+
+    Planes of triangles around a hold a, so that their quadratics about it are the squares of their normals;
+    so do those around b about b. What both have in common counts once.
+    """
+    places, sums, normal = surface.places, scratch.sums, scratch.planes[0]
+    scratch.planes[:] = 0.0
+    for k in range(len(sums)):
+        for i in range(6):
+            sums[k, i] = surface.squares[b, k, i]
         for i in range(3):
             sums[k, 10 + i] = (places[b, k, i] - places[b, 0, i]) - (places[a, k, i] - places[a, 0, i])
+    for i in range(3):
+        normal[i] = surface.normals[b, i]
+    c = surface.first[a]
+    while c >= 0:
+        if surface.triangles[c // 3, 0] >= 0 and _corner_of(surface.triangles, c // 3, b) >= 0:
+            for k in range(len(sums)):
+                x, y, z = _normal(surface, c // 3, k)
+                _add_square(sums, k, x, y, z, -1.0)
+                if k == 0:
+                    normal[0] -= x
+                    normal[1] -= y
+                    normal[2] -= z
+        c = surface.follow[c]
+    volume = 0.0
+    for i in range(3):
+        volume += normal[i] * (places[b, 0, i] - places[a, 0, i])
+        normal[i] += surface.normals[a, i]
+    for k in range(len(sums)):
+        x, y, z = (
+            places[b, k, 0] - places[a, k, 0],
+            places[b, k, 1] - places[a, k, 1],
+            places[b, k, 2] - places[a, k, 2],
+        )
+        sums[k, 6] = sums[k, 0] * x + sums[k, 1] * y + sums[k, 2] * z
+        sums[k, 7] = sums[k, 1] * x + sums[k, 3] * y + sums[k, 4] * z
+        sums[k, 8] = sums[k, 2] * x + sums[k, 4] * y + sums[k, 5] * z
+        sums[k, 9] = sums[k, 6] * x + sums[k, 7] * y + sums[k, 8] * z
+        for i in range(6):
+            sums[k, i] += surface.squares[a, k, i]
+        if k == 0:
+            scratch.squared[0] = sums[k, 0] + sums[k, 3] + sums[k, 5]
+        for i in range(10):
+            sums[k, i] *= SURFACE_SHARE / 36
     return volume
 
 
@@ -271,34 +344,34 @@ def _cross(planes: Float64) -> tuple[float, float, float]:
 
 
 @compiled
-def _add_minimum(planes: Float64, count: int, a: Float64, b: Float64) -> int:
-    """Add planes through the constrained minimum of p.A.p / 2 - b.p, A (6,), b (3,); return their number."""
-    rows = np.zeros((3, 3))
+def _add_minimum(count: int, scratch: Scratch) -> int:
+    """Add planes through the constrained minimum of p.A.p / 2 - b.p, `total`; return their number."""
+    planes, rows, s = scratch.planes, scratch.rows, scratch.total
     wanted = 3 - count
     if count == 0:
+        rows[:] = 0.0
         rows[0, 0] = rows[1, 1] = rows[2, 2] = 1.0
     elif count == 1:
-        n = planes[0]
         least = 0
         for i in range(1, 3):
-            if abs(n[i]) < abs(n[least]):
+            if abs(planes[0, i]) < abs(planes[0, least]):
                 least = i
         i, j = (least + 1) % 3, (least + 2) % 3
-        rows[0, i], rows[0, j] = -n[j], n[i]
-        rows[1, 0] = n[1] * rows[0, 2] - n[2] * rows[0, 1]
-        rows[1, 1] = n[2] * rows[0, 0] - n[0] * rows[0, 2]
-        rows[1, 2] = n[0] * rows[0, 1] - n[1] * rows[0, 0]
+        rows[0, least], rows[0, i], rows[0, j] = 0.0, -planes[0, j], planes[0, i]
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            rows[1, k] = planes[0, i] * rows[0, j] - planes[0, j] * rows[0, i]
     elif count == 2:
         rows[0, 0], rows[0, 1], rows[0, 2] = _cross(planes)
     for i in range(wanted):
-        x, y, z = rows[i]
+        x, y, z = rows[i, 0], rows[i, 1], rows[i, 2]
         count = _add_plane(
             planes,
             count,
-            x * a[0] + y * a[1] + z * a[2],
-            x * a[1] + y * a[3] + z * a[4],
-            x * a[2] + y * a[4] + z * a[5],
-            x * b[0] + y * b[1] + z * b[2],
+            x * s[0] + y * s[1] + z * s[2],
+            x * s[1] + y * s[3] + z * s[4],
+            x * s[2] + y * s[4] + z * s[5],
+            x * s[6] + y * s[7] + z * s[8],
         )
     return count
 
@@ -329,10 +402,10 @@ def _cost_at(sums: Float64, place: Float64, t: float) -> float:
     """Return the cost of a position relative to one end, with the motion at t along the edge."""
     cost = 0.0
     for k in range(len(sums)):
-        s = sums[k]
-        x, y, z = place[0] + t * s[10], place[1] + t * s[11], place[2] + t * s[12]
-        cost += s[0] * x * x + s[3] * y * y + s[5] * z * z + 2 * (s[1] * x * y + s[2] * x * z + s[4] * y * z)
-        cost += s[9] - 2 * (s[6] * x + s[7] * y + s[8] * z)
+        x, y, z = place[0] + t * sums[k, 10], place[1] + t * sums[k, 11], place[2] + t * sums[k, 12]
+        cost += sums[k, 0] * x * x + sums[k, 3] * y * y + sums[k, 5] * z * z
+        cost += 2 * (sums[k, 1] * x * y + sums[k, 2] * x * z + sums[k, 4] * y * z)
+        cost += sums[k, 9] - 2 * (sums[k, 6] * x + sums[k, 7] * y + sums[k, 8] * z)
     return max(cost, 0.0)
 
 
@@ -342,7 +415,7 @@ def _cost_alone(surface: Surface, scratch: Scratch) -> float:
     whole. It counts as if it were as wide as it is long: a hair has little area, yet its lack is seen."""
     corners, squared = surface.triangles[scratch.ring[0]], 0.0
     for i in range(3):
-        way = _distance(surface.places[corners[i], 0], surface.places[corners[(i + 1) % 3], 0])
+        way = _distance(surface.places, corners[i], corners[(i + 1) % 3])
         squared = max(squared, way * way)
     scratch.squared[0] = squared * squared
     return float(surface.places.shape[1] * (1 - SURFACE_SHARE) / 2 * squared**3)
@@ -357,50 +430,58 @@ def _find_place(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[flo
         return -1.0, 0.0
     if kind[a] != FREE and kind[b] != FREE and not _is_line(surface, a, b):
         return -1.0, 0.0
-    count = _find_ring(surface, a, b, scratch.ring)
-    if count < 0:
+    if surface.own[a] > MAX_RING or surface.own[b] > MAX_RING:
         return -1.0, 0.0
-    edge = np.empty(3)
-    squared = 0.0
-    for i in range(3):
-        edge[i] = places[b, 0, i] - places[a, 0, i]
-        squared += edge[i] * edge[i]
-    if count == 1:
-        scratch.place[:] = 0.0
+    ex, ey, ez = (
+        places[b, 0, 0] - places[a, 0, 0],
+        places[b, 0, 1] - places[a, 0, 1],
+        places[b, 0, 2] - places[a, 0, 2],
+    )
+    squared = _square(ex, ey, ez)
+    sums, place = scratch.sums, scratch.place
+    if surface.own[a] == 1 and surface.own[b] == 1:
+        _find_ring(surface, a, b, scratch.ring)
+        place[:] = 0.0
         return _cost_alone(surface, scratch), 0.0
-    volume = _sum_changes(surface, a, b, count, scratch)
-    if kind[a] != FREE or kind[b] != FREE:
-        _add_lines(surface, a, b, count, (1 - SURFACE_SHARE) * squared / 4, scratch)
-    sums, planes, place = scratch.sums, scratch.planes, scratch.place
+    volume = _sum_changes(surface, a, b, scratch)
     if kind[a] != FREE or kind[b] != FREE:  # one end stays
+        count = _find_ring(surface, a, b, scratch.ring)
+        _add_lines(surface, a, b, count, (1 - SURFACE_SHARE) * squared / 4, scratch)
         place[:] = 0.0
         at_a = _cost_at(sums, place, 0.0)
-        place[:] = edge
+        place[0], place[1], place[2] = ex, ey, ez
         at_b = _cost_at(sums, place, 1.0)
         if kind[a] > kind[b] or (kind[a] == kind[b] and at_a <= at_b):
             place[:] = 0.0
             return at_a, 0.0
         return at_b, 1.0
-    x, y, z = planes[0, 0], planes[0, 1], planes[0, 2]
-    found = _add_plane(planes, 0, x, y, z, volume)
-    hessian, right = np.zeros(6), np.zeros(3)
-    for k in range(len(sums)):
-        s = sums[k]
-        for i in range(6):
-            hessian[i] += s[i]
-        gx, gy, gz = 0.5 * s[10], 0.5 * s[11], 0.5 * s[12]
-        right[0] += s[6] - (s[0] * gx + s[1] * gy + s[2] * gz)
-        right[1] += s[7] - (s[1] * gx + s[3] * gy + s[4] * gz)
-        right[2] += s[8] - (s[2] * gx + s[4] * gy + s[5] * gz)
-    found = _add_minimum(planes, found, hessian, right)
+    planes = scratch.planes
+    found = _add_plane(planes, 0, planes[0, 0], planes[0, 1], planes[0, 2], volume)
+    _add_poses(scratch)
+    found = _add_minimum(found, scratch)
     if found < 3:
-        _sum_neighbours(surface, a, b, count, scratch.ring, hessian, right)
-        found = _add_minimum(planes, found, hessian, right)
+        count = _find_ring(surface, a, b, scratch.ring)
+        _sum_neighbours(surface, a, b, count, scratch)
+        found = _add_minimum(found, scratch)
     if found < 3 or not _intersect(planes, place):
         return -1.0, 0.0
-    along = place[0] * edge[0] + place[1] * edge[1] + place[2] * edge[2]
+    along = place[0] * ex + place[1] * ey + place[2] * ez
     t = min(max(along / squared, 0.0), 1.0) if squared > 0.0 else 0.5
     return _cost_at(sums, place, t), t
+
+
+@compiled
+def _add_poses(scratch: Scratch) -> None:
+    """Write the sum of the quadratics of all poses, with the motion half way along the edge."""
+    sums, total = scratch.sums, scratch.total
+    total[:] = 0.0
+    for k in range(len(sums)):
+        for i in range(6):
+            total[i] += sums[k, i]
+        x, y, z = 0.5 * sums[k, 10], 0.5 * sums[k, 11], 0.5 * sums[k, 12]
+        total[6] += sums[k, 6] - (sums[k, 0] * x + sums[k, 1] * y + sums[k, 2] * z)
+        total[7] += sums[k, 7] - (sums[k, 1] * x + sums[k, 3] * y + sums[k, 4] * z)
+        total[8] += sums[k, 8] - (sums[k, 2] * x + sums[k, 4] * y + sums[k, 5] * z)
 
 
 @compiled
@@ -420,22 +501,20 @@ def _priority(surface: Surface, a: int, b: int, scratch: Scratch) -> tuple[float
 
 
 @compiled
-def _sum_neighbours(
-    surface: Surface, a: int, b: int, count: int, ring: Int32, hessian: Float64, right: Float64
-) -> None:
+def _sum_neighbours(surface: Surface, a: int, b: int, count: int, scratch: Scratch) -> None:
     """Write the quadratic of the squared distances to the corners around an edge."""
-    hessian[:] = 0.0
-    right[:] = 0.0
+    total = scratch.total
+    total[:] = 0.0
     for i in range(count):
         for k in range(3):
-            v = surface.triangles[ring[i], k]
+            v = surface.triangles[scratch.ring[i], k]
             if v in (a, b):
                 continue
-            hessian[0] += 1.0
-            hessian[3] += 1.0
-            hessian[5] += 1.0
+            total[0] += 1.0
+            total[3] += 1.0
+            total[5] += 1.0
             for n in range(3):
-                right[n] += surface.places[v, 0, n] - surface.places[a, 0, n]
+                total[6 + n] += surface.places[v, 0, n] - surface.places[a, 0, n]
 
 
 @compiled
@@ -443,10 +522,9 @@ def _add_neighbours(surface: Surface, v: int, near: Int32, count: int) -> int:
     """Append the neighbours of v that are not listed yet; return the number of all."""
     c = surface.first[v]
     while c >= 0:
-        triangle = surface.triangles[c // 3]
-        if triangle[0] >= 0:
+        if surface.triangles[c // 3, 0] >= 0:
             for k in range(3):
-                w = triangle[k]
+                w = surface.triangles[c // 3, k]
                 new = w != v
                 for i in range(count):
                     new = new and near[i] != w
@@ -468,11 +546,11 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
     c = surface.first[b]
     seen = np.zeros(own, dtype=np.bool_)
     while c >= 0:
-        triangle = surface.triangles[c // 3]
-        if triangle[0] >= 0:
+        if surface.triangles[c // 3, 0] >= 0:
             for k in range(3):
+                w = surface.triangles[c // 3, k]
                 for i in range(own):
-                    if near[i] == triangle[k] and triangle[k] != b:
+                    if near[i] == w and w != b:
                         seen[i] = True
         c = surface.follow[c]
     for i in range(own):
@@ -481,7 +559,7 @@ def _is_valid(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
     c = surface.first[a]
     while c >= 0:
         t = c // 3
-        if surface.triangles[t, 0] >= 0 and _corner_of(surface.triangles[t], b) >= 0:
+        if surface.triangles[t, 0] >= 0 and _corner_of(surface.triangles, t, b) >= 0:
             faces, one = faces + 1, t
             if _loses_corner(surface, a, b, t):
                 return False
@@ -527,9 +605,10 @@ def _cuts_line(surface: Surface, a: int, b: int, scratch: Scratch) -> bool:
     lines[a] |= lines[b]
     cuts = False
     for line in range(len(surface.ends)):
-        start, end = np.int64(surface.ends[line, 0]), np.int64(surface.ends[line, 1])
+        start: Any = np.int64(surface.ends[line, 0])
+        end: Any = np.int64(surface.ends[line, 1])
         if start >= 0 and not cuts:
-            by = _distance(places[start, 0], places[a, 0]) + _distance(places[a, 0], places[end, 0])
+            by = _distance(places, start, a) + _distance(places, a, end)
             both = had & lines[b] & (np.int64(1) << line)
             wanted = surface.left[line] - (1 if both else 0)
             cuts = by <= surface.longest[line] and leaves_line(surface, line, a, b, wanted, scratch)
@@ -565,9 +644,9 @@ def leaves_line(surface: Surface, line: int, a: int, b: int, wanted: int, scratc
                     w = a if w == b else w
                     if surface.triangles[c // 3, 0] >= 0 and w != v:
                         along = surface.lines[v] & surface.lines[w] & bit
-                        step = _distance(places[v, 0], places[w, 0])
+                        step = _distance(places, v, w)
                         to_w = way + (step if along else step * (1 - NEARLY))
-                        if to_w < reach[w] and to_w + _distance(places[w, 0], places[end, 0]) <= most:
+                        if to_w < reach[w] and to_w + _distance(places, w, end) <= most:
                             reach[w], steps[w] = to_w, steps[v] + 1 if along else -MAX_ON_LINE
                             touched.append(w)
                             heappush(heap, (to_w, w))
@@ -578,9 +657,14 @@ def leaves_line(surface: Surface, line: int, a: int, b: int, wanted: int, scratc
 
 
 @inlined
-def _distance(one: Float64, other: Float64) -> float:
-    """Return the distance of two positions (3,)."""
-    return float(np.sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2 + (one[2] - other[2]) ** 2))
+def _distance(places: Float64, v: int, w: int) -> float:
+    """Return the distance of two vertices at rest."""
+    x, y, z = (
+        places[v, 0, 0] - places[w, 0, 0],
+        places[v, 0, 1] - places[w, 0, 1],
+        places[v, 0, 2] - places[w, 0, 2],
+    )
+    return float(np.sqrt(_square(x, y, z)))
 
 
 @compiled
@@ -597,7 +681,7 @@ def _on_border(surface: Surface, v: int) -> bool:
                 count = 0
                 d = surface.first[v]
                 while d >= 0:
-                    if surface.triangles[d // 3, 0] >= 0 and _corner_of(surface.triangles[d // 3], w) >= 0:
+                    if surface.triangles[d // 3, 0] >= 0 and _corner_of(surface.triangles, d // 3, w) >= 0:
                         count += 1
                     d = surface.follow[d]
                 if count == 1:
@@ -613,14 +697,14 @@ def _turns_over(
     """Return whether a triangle would turn too far in a pose, lose its area, or become a sliver at rest."""
     places, place = surface.places, scratch.place
     for i in range(count):
-        corners = surface.triangles[scratch.ring[i]]
-        at_a, at_b = _corner_of(corners, a), _corner_of(corners, b)
+        own = scratch.ring[i]
+        at_a, at_b = _corner_of(surface.triangles, own, a), _corner_of(surface.triangles, own, b)
         if at_a >= 0 and at_b >= 0:
             continue
         at = max(at_a, at_b)
-        v, p, q = corners[at], corners[(at + 1) % 3], corners[(at + 2) % 3]
+        v, p = surface.triangles[own, at], surface.triangles[own, (at + 1) % 3]
+        q = surface.triangles[own, (at + 2) % 3]
         for k in range(places.shape[1]):
-            s = scratch.sums[k]
             ex, ey, ez = (
                 places[q, k, 0] - places[p, k, 0],
                 places[q, k, 1] - places[p, k, 1],
@@ -631,9 +715,9 @@ def _turns_over(
                 places[v, k, 1] - places[p, k, 1],
                 places[v, k, 2] - places[p, k, 2],
             )
-            wx = places[a, k, 0] + place[0] + t * s[10] - places[p, k, 0]
-            wy = places[a, k, 1] + place[1] + t * s[11] - places[p, k, 1]
-            wz = places[a, k, 2] + place[2] + t * s[12] - places[p, k, 2]
+            wx = places[a, k, 0] + place[0] + t * scratch.sums[k, 10] - places[p, k, 0]
+            wy = places[a, k, 1] + place[1] + t * scratch.sums[k, 11] - places[p, k, 1]
+            wz = places[a, k, 2] + place[2] + t * scratch.sums[k, 12] - places[p, k, 2]
             ax, ay, az = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
             bx, by, bz = ey * wz - ez * wy, ez * wx - ex * wz, ex * wy - ey * wx
             before, after = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
@@ -651,11 +735,9 @@ def _turns_over(
 @compiled
 def _cuts_ball(surface: Surface, a: int, b: int, t: float, count: int, scratch: Scratch) -> bool:
     """Return whether a triangle would cut a ball in a pose, and deeper than those around the edge do."""
-    for ball in surface.balls:
-        near = False
-        for k in range(surface.places.shape[1]):
-            near = near or is_near(ball, surface.places[a, k])
-        if near:
+    for n in range(len(surface.balls)):
+        if is_near(surface.balls, n, surface.places, a):
+            ball = surface.balls[n]
             after = _deepest(surface, ball, a, b, t, count, scratch)
             if after > MAX_CUT and after > _deepest(surface, ball, -1, -1, t, count, scratch):
                 return True
@@ -670,12 +752,16 @@ def _deepest(
     collapsed; -1 twice for as they are."""
     places, corners, deepest = surface.places, np.empty((2, 3, 3)), 0.0
     for i in range(count):
-        triangle = surface.triangles[scratch.ring[i]]
-        if a >= 0 and _corner_of(triangle, a) >= 0 and _corner_of(triangle, b) >= 0:
+        own = scratch.ring[i]
+        if (
+            a >= 0
+            and _corner_of(surface.triangles, own, a) >= 0
+            and _corner_of(surface.triangles, own, b) >= 0
+        ):
             continue
         for k in range(places.shape[1]):
             for at in range(3):
-                v = triangle[at]
+                v = surface.triangles[own, at]
                 for n in range(3):
                     if v in (a, b):
                         corners[min(k, 1), at, n] = (
@@ -703,7 +789,8 @@ def collapse_edges(
     done, faces: collapses in the history so far, and triangles left. Where only one more triangle may go, an
     edge of a border goes, if there is any. Return the number of collapses in the history.
     """
-    triangles, version = surface.triangles, surface.version
+    triangles, joined, changed = surface.triangles, surface.joined, surface.changed
+    refused = np.zeros(len(joined), dtype=np.bool_)
     before, least = -1, MIN_COMPACTNESS
     while faces > target and (before != done or least > 0.0):
         if before == done:
@@ -717,29 +804,26 @@ def collapse_edges(
                 if triangles[t, 0] >= 0 and (a < b or not _has_edge(surface, b, a)):
                     cost, _ = _priority(surface, a, b, scratch)
                     if cost >= 0.0:
-                        heappush(heap, (cost, np.int64(a), np.int64(b), version[a] + version[b]))
+                        heappush(heap, (cost, np.int64(a), np.int64(b), np.int64(done)))
         while len(heap) > 0 and faces > target:
             _, a, b, stamp = heappop(heap)
-            if history.onto[a] != a or history.onto[b] != b:
-                continue
+            if history.onto[a] != a or history.onto[b] != b or stamp < max(joined[a], joined[b]):
+                continue  # the edge is gone, or is in the heap again
             cost, along = _priority(surface, a, b, scratch)
             if cost < 0.0:
                 continue
-            if stamp != version[a] + version[b]:
-                heappush(heap, (cost, a, b, version[a] + version[b]))
+            if stamp < max(changed[a], changed[b]):
+                heappush(heap, (cost, a, b, np.int64(done)))
                 continue
             count = _find_ring(surface, a, b, scratch.ring)
             lost = 0
             for i in range(count):
-                corners = triangles[scratch.ring[i]]
-                lost += _corner_of(corners, a) >= 0 and _corner_of(corners, b) >= 0
-            if faces - lost < target or _turns_over(surface, a, b, along, count, least, scratch):
+                t = scratch.ring[i]
+                lost += _corner_of(triangles, t, a) >= 0 and _corner_of(triangles, t, b) >= 0
+            if faces - lost < target:
                 continue
-            if not _is_valid(surface, a, b, scratch):
-                continue
-            if least > 0.0 and (
-                _cuts_line(surface, a, b, scratch) or _cuts_ball(surface, a, b, along, count, scratch)
-            ):
+            if not _may_collapse(surface, a, b, along, count, least, scratch):
+                refused[a] = refused[b] = True
                 continue
             kind, other = surface.kind[a], surface.kind[b]
             if other > kind or (other == kind and kind != FREE and along > 0.0):
@@ -751,15 +835,39 @@ def collapse_edges(
             history.faces[done] = faces
             done += 1
             around = _add_neighbours(surface, a, scratch.near, 0)
-            version[a] += 1
+            joined[a] = changed[a] = done
+            _look_around(surface, a)
             for i in range(around):
-                version[scratch.near[i]] += 1
+                changed[scratch.near[i]] = done
+                _look_around(surface, scratch.near[i])
             for i in range(around):
                 near: Any = np.int64(scratch.near[i])
                 cost, _ = _priority(surface, a, near, scratch)
                 if cost >= 0.0:
-                    heappush(heap, (cost, a, near, version[a] + version[near]))
+                    heappush(heap, (cost, a, near, np.int64(done)))
+                c = surface.first[near] if refused[near] else np.int32(-1)
+                refused[near] = False
+                while c >= 0:  # what was in the way may be gone
+                    next_one: Any = np.int64(triangles[c // 3, (c % 3 + 1) % 3])
+                    if triangles[c // 3, 0] >= 0 and refused[next_one]:
+                        cost, _ = _priority(surface, near, next_one, scratch)
+                        if cost >= 0.0:
+                            heappush(heap, (cost, near, next_one, np.int64(done)))
+                    c = surface.follow[c]
     return done
+
+
+@compiled
+def _may_collapse(
+    surface: Surface, a: int, b: int, along: float, count: int, least: float, scratch: Scratch
+) -> bool:
+    """Return whether an edge whose ring and place were found may collapse. least: compactness; 0 for the last
+    resort, which lets triangles cut lines and balls."""
+    if _turns_over(surface, a, b, along, count, least, scratch) or not _is_valid(surface, a, b, scratch):
+        return False
+    if least <= 0.0:
+        return True
+    return not (_cuts_line(surface, a, b, scratch) or _cuts_ball(surface, a, b, along, count, scratch))
 
 
 @compiled
@@ -804,7 +912,7 @@ def _collapse(
     while c >= 0:  # wedges on the two sides of the edge become one
         t = c // 3
         if triangles[t, 0] >= 0:
-            k = _corner_of(triangles[t], keep)
+            k = _corner_of(triangles, t, keep)
             if k >= 0:
                 old, new = wedges[t, c % 3], wedges[t, k]
                 if history.wedge_onto[old] == old and old != new:
@@ -817,7 +925,7 @@ def _collapse(
         t, k = c // 3, c % 3
         if triangles[t, 0] >= 0:
             wedges[t, k] = history.wedge_onto[wedges[t, k]]
-            if _corner_of(triangles[t], keep) >= 0:
+            if _corner_of(triangles, t, keep) >= 0:
                 triangles[t, 0] = -1
                 surface.share[surface.part[t]] -= 1
             else:

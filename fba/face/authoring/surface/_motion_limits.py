@@ -155,6 +155,11 @@ def stop_at_folds(limiter: Limiter, motion: Motion, *, turning: bool = False) ->
     def is_sound(shifts: Float64) -> bool:
         return patch.is_sound(limiter.spread(motion.vertices, shifts), turning=turning)
 
+    return stop_motion(motion, is_sound)
+
+
+def stop_motion(motion: Motion, is_sound: Callable[[Float64], bool]) -> Motion:
+    """Return the motion, stopped on both sides of 0 where its shifts (N, 3) are not sound."""
     zero = int(np.flatnonzero(motion.values == 0)[0])
     down = _stop_one_side(motion, range(zero - 1, -1, -1), is_sound)
     up = _stop_one_side(motion, range(zero + 1, len(motion.values)), is_sound)
