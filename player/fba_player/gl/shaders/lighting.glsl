@@ -135,7 +135,7 @@ uniform sampler2D tops;   // along the key light: what share is covered, height 
 // is hidden where little around is covered: at an outline of the body, seen from the light.
 float unshaded(vec3 before) {
     vec2 aside = vec2(1.2, 0.6) / float(textureSize(tops, 1).x);
-    vec3 seen = textureLod(tops, before.xy + aside, 3.0).rgb + textureLod(tops, before.xy - aside, 3.0).rgb;
+    vec3 seen = textureLod(tops, before.xy + aside, 2.0).rgb + textureLod(tops, before.xy - aside, 2.0).rgb;
     vec2 mean = seen.yz / max(seen.x, 1e-3);
     float above = max(mean.x - before.z, 0.0), spread = max(mean.y - mean.x * mean.x, 2e-4);
     float hidden = 0.84 * clamp(1.0 - (spread / (spread + above * above) - 0.3) * 1.43, 0.0, 1.0);
