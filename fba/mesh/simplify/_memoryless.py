@@ -57,7 +57,7 @@ class Simplification:
     """A mesh and the collapses that simplify it: every level between the full mesh and the last one.
 
     positions: float64 (N, 3), at rest. triangles: int32 (F, 3). faces: int32 (C,), the number of triangles
-    left by each collapse. The others are those of the collapses: see `_memoryless_loops.History`.
+    left by each collapse. The others are those of the collapses: see `_memoryless_mesh.History`.
     """
 
     positions: Float64
@@ -163,6 +163,7 @@ def simplify(
     name other vertices.
     """
     from fba.mesh.simplify import _memoryless_loops as loops
+    from fba.mesh.simplify import _memoryless_mesh as state
 
     places, corners = _check(poses, triangles)
     points, wedges, parts = _number_vertices(places, looks)
@@ -175,7 +176,7 @@ def simplify(
     weight, through = _hold(kind, points, importance, lines)
     welded = np.empty((total, len(places), 3))
     welded[points] = places.transpose(1, 0, 2)
-    surface = loops.Surface(
+    surface = state.Surface(
         welded, whole, sides, np.full(total, -1, np.int32), np.full(3 * len(whole), -1, np.int32),
         kind, np.zeros((total, len(places), 6)), np.zeros((total, 3)), np.zeros(total, np.int32),
         np.zeros(total, np.int64), np.zeros(total, np.int64), weight, through,
@@ -218,7 +219,7 @@ def _hold(
 
     kind: (V,), by borders and seams. points: (N,). importance, lines: as `simplify` takes them.
     """
-    from fba.mesh.simplify import _memoryless_loops as loops
+    from fba.mesh.simplify import _memoryless_mesh as state
 
     weight, through = np.ones(len(kind)), np.zeros(len(kind), np.int64)
     if importance is not None:
@@ -228,7 +229,7 @@ def _hold(
                 f"importance must be {len(points)} numbers that are not negative, one for each vertex"
             )
         weight[points] = factors
-        kind[points[np.isinf(factors)]] = loops.PINNED
+        kind[points[np.isinf(factors)]] = state.PINNED
         weight[np.isinf(weight)] = 1.0
     if lines is not None:
         bits = np.asarray(lines)
@@ -237,22 +238,22 @@ def _hold(
                 f"lines must be {len(points)} whole numbers from 0 to 2**63 - 1, one for each vertex"
             )
         np.bitwise_or.at(through, points, bits.astype(np.int64))
-        kind[(through > 0) & (kind == loops.ON_LINE)] = loops.PINNED  # where a line meets a border
-        kind[(through > 0) & (kind == loops.FREE)] = loops.ON_LINE
+        kind[(through > 0) & (kind == state.ON_LINE)] = state.PINNED  # where a line meets a border
+        kind[(through > 0) & (kind == state.FREE)] = state.ON_LINE
     return weight, through
 
 
 def _allocate(vertices: int, wedges: int, poses: int) -> tuple[Any, Any]:
-    """Return the history and the scratch arrays of `_memoryless_loops` for these numbers."""
-    from fba.mesh.simplify import _memoryless_loops as loops
+    """Return the history and the scratch arrays of `_memoryless_mesh` for these numbers."""
+    from fba.mesh.simplify import _memoryless_mesh as state
 
-    history = loops.History(
+    history = state.History(
         np.zeros(vertices, np.int32), np.zeros((vertices, 3)), np.zeros(vertices, np.int32),
         np.arange(vertices, dtype=np.int32), np.full(vertices, vertices, np.int32),
         np.arange(wedges, dtype=np.int32), np.full(wedges, vertices, np.int32),
     )  # fmt: skip
-    scratch = loops.Scratch(
-        np.empty(2 * loops.MAX_RING, np.int32), np.empty(4 * loops.MAX_RING + 4, np.int32),
+    scratch = state.Scratch(
+        np.empty(2 * state.MAX_RING, np.int32), np.empty(4 * state.MAX_RING + 4, np.int32),
         np.empty((poses, 13)), np.empty(9), np.empty((3, 4)), np.empty((3, 3)), np.empty(3), np.empty(1),
         np.full(vertices, np.inf), np.zeros(vertices, np.int32),
     )  # fmt: skip
@@ -261,11 +262,12 @@ def _allocate(vertices: int, wedges: int, poses: int) -> tuple[Any, Any]:
 
 def _link(surface: Any, scratch: Any) -> None:
     """Link the corners of a surface, and leave out lines that leave their way before anything collapses."""
-    from fba.mesh.simplify import _memoryless_loops as loops
+    from fba.mesh.simplify import _memoryless_mesh as state
+    from fba.mesh.simplify import _memoryless_rules as rules
 
-    loops.link_corners(surface)
+    state.link_corners(surface)
     for line, (start, left) in enumerate(zip(surface.ends[:, 0], surface.left, strict=True)):
-        if start >= 0 and loops.leaves_line(surface, line, start, start, left, scratch):
+        if start >= 0 and rules.leaves_line(surface, line, start, start, left, scratch):
             surface.ends[line] = -1
 
 
@@ -398,7 +400,7 @@ def _number_rows(rows: Float64) -> Int32:
 
 def _kinds(triangles: Int32, wedges: Int32, count: int) -> Int32:
     """Return int32 (V,): which vertices may move, by the borders and seams that they lie on."""
-    from fba.mesh.simplify import _memoryless_loops as loops
+    from fba.mesh.simplify import _memoryless_mesh as state
 
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     sides = wedges[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -414,14 +416,14 @@ def _kinds(triangles: Int32, wedges: Int32, count: int) -> Int32:
     most = int(wedges.max(initial=0)) + 1
     pairs = np.unique(triangles.ravel().astype(np.int64) * most + wedges.ravel())
     parts = np.bincount(pairs // most, minlength=count)
-    kind = np.full(count, loops.FREE, dtype=np.int32)
-    kind[lines > 0] = loops.ON_LINE
-    kind[(lines == 1) | (lines > 2) | crowded | (parts > 2) | ((lines == 0) & (parts > 1))] = loops.PINNED
+    kind = np.full(count, state.FREE, dtype=np.int32)
+    kind[lines > 0] = state.ON_LINE
+    kind[(lines == 1) | (lines > 2) | crowded | (parts > 2) | ((lines == 0) & (parts > 1))] = state.PINNED
     return kind
 
 
 def _measure_lines(places: Float64, triangles: Int32, lines: Int64) -> tuple[Int32, Int32, Float64]:
-    """Return the ends of lines, their vertices and their lengths; see `_memoryless_loops.Surface`.
+    """Return the ends of lines, their vertices and their lengths; see `_memoryless_mesh.Surface`.
 
     places: (V, 3). triangles: (F, 3). lines: (V,), a bit for each line. What is no open line has no ends.
     """

@@ -27,7 +27,7 @@ AT_EASE = {
 }  # fmt: skip
 """Degrees of the BAPs of a left hand at ease, by name; `pivot` opens a right hand the other way."""
 SAID = 0.15
-"""Radians of any of its fingers from which one of `FINGERS` is shown as sent."""
+"""Radians of a finger above which all of its group in `FINGERS` are shown as sent."""
 FINGERS = (("index", "middle", "ring", "pinky"), ("thumb",))
 """Those that are at ease together: programs that bend fingers often leave out the thumb."""
 
