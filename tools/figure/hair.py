@@ -141,15 +141,18 @@ def height_above_hairline(positions: Float64) -> Float64:
     return np.where(ears, -1.0, above)
 
 
-def painted_height(positions: Float64, hair: Hair) -> Float64:
-    """Return (N,) heights above the hairline as hair is painted: less where it is cropped, and irregular."""
+def painted_height(positions: Float64, grown: Float64, hair: Hair) -> Float64:
+    """Return (N,) heights above the hairline as hair is painted: less where it is cropped, and irregular.
+
+    positions, grown: (N, 3), of the skin, and with the layer of hair.
+    """
     ragged = RAGGED[int(hair.curly)] * (noise(positions, 0.011, 71) + 0.7 * noise(positions, 0.004, 72))
     above = height_above_hairline(positions)
     height = np.where(above > -0.5, (above + ragged) / (1 + _cropped(positions)), above)
     if hair.curly:
         return height
     # Along the parting, which ends softly on the crown, there is scalp as well.
-    places = strand_places(positions)
+    places = strand_places(grown)
     away = places.real * _metres(places) + 0.0012 * noise(positions, 0.004, 67)
     crossed = 0.006 * np.maximum(noise(positions, 0.006, 68), 0.0)  # by strands of the other side
     behind = 0.010 * smoothstep((0.95 - np.cos(places.imag)) / 0.7)
@@ -206,12 +209,12 @@ def _map_axes() -> tuple[Float64, Float64, Float64, float]:
     return ahead, np.cross(middle, ahead), middle, float(front @ ahead / (1 + front @ middle))
 
 
-def paint_locks(p: Float64, step: Float64, hair: Hair) -> tuple[Float64, Float64]:
+def paint_locks(p: Float64, step: Float64, above: Float64, hair: Hair) -> tuple[Float64, Float64]:
     """Return (N,) how bright hair is at points (N, 3), about -1..1, and (N,) how much of them it covers.
 
-    step: (N, 3), how far the texel of a point reaches along the strands' least resolved direction.
+    step: (N, 3), how far the texel of a point reaches along the least resolved direction. above: (N,),
+    as of `painted_height`.
     """
-    above = painted_height(p, hair)
     picture = _draw_locks(_sow_locks(p, above, hair), hair)
     drawn, cover = np.mean([_look_up(picture, p + share * step) for share in WITHIN], axis=0)
     # Between strands one sees deep into full hair, but the skin where it is sparse.

@@ -24,6 +24,7 @@ import sculpt
 from hair import grow, scalp
 from looks import ALEX, Looks, reshape
 from meshes import Mesh, join, mirror, unique_edges
+from scipy.interpolate import PchipInterpolator
 from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
 from subdivide import Refined, refine
 
@@ -43,6 +44,8 @@ BEHIND = 0.012
 """Metres from there to the middle of the lips."""
 ABOVE = 0.0005
 """Metres from the top of the hair up to its feature point."""
+ROWS = np.array([[0.0, 0.375, 0.727, 0.814, 1.0], [0.0, 0.219, 0.566, 0.658, 1.0]])
+"""Heights in the base figure's texture, from below, and in ours: more room for hair, less for the neck."""
 TONGUE = TEETH + np.array([0.0, -0.0004, -0.0019])
 
 
@@ -63,7 +66,8 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
     edges = unique_edges(refined.triangles)
     softened = sculpt.soften_crease(refined.vertices, marks, edges)
     vertices = sculpt.press_lips(sculpt.lay_on_eyeballs(softened, marks.eye), marks) - ORIGIN
-    return replace(refined, vertices=symmetrise(vertices)), marks
+    uvs = np.stack([refined.uvs[:, 0], PchipInterpolator(*ROWS)(refined.uvs[:, 1])], axis=1)
+    return replace(refined, vertices=symmetrise(vertices), uvs=uvs), marks
 
 
 def symmetrise(vertices: Float64) -> Float64:
@@ -166,7 +170,7 @@ def _skin_part(surface: Refined, marks: sculpt.Marks, looks: Looks, painted: boo
     texcoords = np.where(uv_rows[:, None] >= 0, surface.uvs[uv_rows], inner_uv)
     texcoords = np.stack([texcoords[:, 0], 1 - texcoords[:, 1]], axis=1)
     triangles = np.array(flat).reshape(-1, 3)
-    texture = paint.encode_jpeg(paint.paint(_chart(surface, marks), looks)) if painted else None
+    texture = paint.encode_jpeg(paint.paint(_chart(surface, marks, looks), looks)) if painted else None
     return Part(
         "skin", "skin", vertices, triangles,
         texcoords=texcoords, colours=_finish(surface, marks)[source],
@@ -174,9 +178,9 @@ def _skin_part(surface: Refined, marks: sculpt.Marks, looks: Looks, painted: boo
     )  # fmt: skip
 
 
-def _chart(surface: Refined, marks: sculpt.Marks) -> paint.Chart:
+def _chart(surface: Refined, marks: sculpt.Marks, looks: Looks) -> paint.Chart:
     outside = surface.uvs[surface.corners].mean(axis=1)[:, 0] < 1.0
-    values = np.stack([marks.mouth, marks.eye, marks.lip], axis=1)
+    values = np.stack([marks.mouth, marks.eye, marks.lip, *grow(surface.vertices, looks.hair).T], axis=1)
     uvs = surface.uvs[surface.corners[outside]]
     return paint.make_chart(surface.vertices, values, surface.triangles[outside], uvs)
 

@@ -31,7 +31,7 @@ TAPER = ((1.0, 110), (0.7, 190), (0.4, 255))
 """Shares of a brow's hair from its root, and how opaque they are, 0..255: it ends in a point."""
 BROW = np.array([
     # along the left brow: x, y, extent downwards and upwards (mm)
-    (12.5, 14.6, 3.0, 2.5), (18, 17.2, 4.0, 3.4), (26, 20.2, 4.2, 3.6), (35, 22.1, 3.5, 3.2),
+    (12.5, 14.4, 2.1, 1.5), (18, 17.0, 3.3, 2.7), (26, 20.2, 3.9, 3.4), (35, 22.1, 3.5, 3.2),
     (44, 21.8, 2.7, 2.6), (52, 18.5, 1.9, 1.9), (59, 13.6, 0.9, 0.9),
 ]) / 1000  # fmt: skip
 
@@ -94,7 +94,8 @@ def brow(positions: Float64, height: float = 1.0) -> tuple[Float64, Float64]:
 
 
 def paint(chart: Chart, looks: Looks) -> Image.Image:
-    """Return the texture of a chart. Its values: rings around mouth and eyes, and the sign of the lip."""
+    """Return the texture of a chart. Its values: rings around mouth and eyes, the sign of the lip, and three
+    of the position with the layer of hair, metres."""
     p = chart.positions_at[chart.known]
     ring_mouth, ring_eye, lip_side = (chart.values_at[chart.known][:, k] for k in range(3))
     colour = _complexion(p, looks)
@@ -102,7 +103,7 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     colour = _eyes(colour, p, ring_eye, looks)
     colour = _mouth(colour, p, ring_mouth, lip_side, looks)
     colour = _ears(colour, p)
-    colour = _hair(colour, p, _texel_steps(chart), looks)
+    colour = _hair(colour, p, _grown_chart(chart), looks)
     colour = _blend(colour, np.array(looks.brow), 0.22 * brow(p, looks.brow_height)[1])
     image = np.zeros((*chart.known.shape, 3))
     image[chart.known] = colour
@@ -113,18 +114,24 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     return Image.fromarray(filled.astype(np.uint8))
 
 
-def _texel_steps(chart: Chart) -> Float64:
-    """Return (N, 3) metres from each known texel to the one below it; 0 at seams."""
-    step = np.gradient(chart.positions_at, axis=0)[chart.known]
-    return np.where(np.linalg.norm(step, axis=1, keepdims=True) < MAX_STEP, step, 0.0)
+def _grown_chart(chart: Chart) -> tuple[Float64, Float64]:
+    """Return (N, 3) positions of known texels with hair, and (N, 3) metres from each to the texel below; 0 at
+    seams."""
+    grown = chart.values_at[..., 3:]
+    step = np.gradient(grown, axis=0)[chart.known]
+    near = np.linalg.norm(step, axis=1, keepdims=True) < MAX_STEP
+    return grown[chart.known], np.where(near, step, 0.0)
 
 
-def _hair(colour: Float64, p: Float64, step: Float64, looks: Looks) -> Float64:
-    """Return the colour with the hair of the head: strands that thin out towards their tips."""
-    above = painted_height(p, looks.hair)
+def _hair(colour: Float64, p: Float64, grown: tuple[Float64, Float64], looks: Looks) -> Float64:
+    """Return the colour with the hair of the head: strands that thin out towards their tips.
+
+    grown: as of `_grown_chart`. Strands lie straight on that: triangles of the skin are stretched by hair.
+    """
+    above = painted_height(p, grown[0], looks.hair)
     near = above > -0.02
-    p, above, hair = p[near], above[near], looks.hair
-    tone, cover = paint_locks(p, step[near], hair)
+    above, hair = above[near], looks.hair
+    tone, cover = paint_locks(grown[0][near], grown[1][near], above, hair)
     strands = np.stack([np.interp(tone, TONES, [c[k] for c in hair.colours]) for k in range(3)], axis=1)
     # Through sparse hair skin is seen, in the shade.
     below = _blend(colour[near], np.array(looks.scalp), smoothstep((above + 0.006) / 0.020) * 0.85)
@@ -346,7 +353,7 @@ def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
 
 def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Float64:
     """Return (N, 3) hairs of the brow, metres: upwards at its inner end, then outwards, last downwards."""
-    angle = np.interp(along, [0.0, 0.2, 0.6, 1.0], [78.0, 42.0, 12.0, -24.0]) + random.normal(0, 9, len(p))
+    angle = np.interp(along, [0.0, 0.2, 0.6, 1.0], [64.0, 38.0, 12.0, -24.0]) + random.normal(0, 9, len(p))
     middle = np.interp(np.abs(p[:, 0]), [0.012, 0.035, 0.06], [0.0148, 0.0232, 0.0135])
     angle = np.radians(angle - np.clip((p[:, 1] - middle) / 0.003, -1, 1) * 22)
     sampled = np.stack([np.cos(angle) * np.sign(p[:, 0]), np.sin(angle), np.zeros(len(p))], axis=1)

@@ -23,6 +23,7 @@ from fba.face.eyeball import PUPIL_FAP
 from fba.face.importers.assembly._repair import repair_tables, take_sounder
 from fba.face.model import DetailLevel, FaceModel, shape_key
 from fba.face.simplification._tables import close_lids, find_balls, find_lines, fit_tables
+from fba.mesh import vertex_normals
 from fba.mesh.simplify import (
     Level,
     Simplification,
@@ -57,8 +58,9 @@ EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
 LASH_SHARE = 0.5
 """The same for lashes: a hair has little area, yet its lack is seen."""
-TEETH_SHARE = 0.35
-"""The same for teeth, which stand out against the dark behind them."""
+TEETH_SHARE, LEAST_TEETH = 1.0, 0.05
+"""The same for the front of teeth, which stand out against the dark behind them, and the factor of this for
+their backs."""
 TONGUE_SHARE = 0.2
 """The same for the tongue, which bends."""
 HAIRS = ("lash", "brow")
@@ -245,10 +247,13 @@ def _importance(model: FaceModel) -> Float64:
     for kind, counts in (
         ("eye", EYE_SHARE),
         ("lash", LASH_SHARE),
-        ("teeth", TEETH_SHARE),
         ("tongue", TONGUE_SHARE),
     ):
         for part in model.of_kind(kind):
             start = model.starts[part.name]
             share[start : start + len(part.vertices)] = counts
+    for part in model.of_kind("teeth"):
+        ahead = vertex_normals(part.vertices, part.triangles)[:, 2]
+        start = model.starts[part.name]
+        share[start : start + len(part.vertices)] = TEETH_SHARE * np.clip(ahead, LEAST_TEETH, 1.0)
     return 1.0 + IMPORTANCE * share**2

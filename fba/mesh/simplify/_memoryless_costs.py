@@ -1,4 +1,7 @@
-"""What a memoryless collapse costs, and where along the edge it goes: Lindstrom and Turk's, over poses."""
+"""What a memoryless collapse costs, and where along the edge it goes: Lindstrom and Turk's, over poses.
+
+Bounds: see `_memoryless_mesh.py`.
+"""
 
 from __future__ import annotations
 

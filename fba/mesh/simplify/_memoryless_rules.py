@@ -1,4 +1,7 @@
-"""Which edges memoryless collapses may not take: rules of surface, shape, lines and balls."""
+"""Which edges memoryless collapses may not take: rules of surface, shape, lines and balls.
+
+Bounds: see `_memoryless_mesh.py`.
+"""
 
 from __future__ import annotations
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from fba.body import BodyModel, BodyPart
 
 
+NEWTON_STEPS, FARTHEST_OUTSIDE = 6, 1.0
+"""Steps in which a place on a triangle is looked for, and how far outside, by weights, it may be."""
 SCATTER = {"skin": 1.0, "tongue": 0.8, "mouth": 0.8, "teeth": 0.5, "eye": 0.3}
 TWO_SIDED = ("brow", "lash", "hair", "other", "teeth", "tongue")
 HAIRY = ("lash", "brow", "hair")
@@ -148,13 +150,14 @@ def coarse_shapes(model: FaceModel, part: Part, shape: FaceShape) -> tuple[Coars
         if not len(own.triangles) or not 0 <= parents.min() <= parents.max() < len(own.vertices):
             return ()
         corners, weights = place_on_full(own.vertices, part.vertices, part.triangles, parents)
-        at, out = (np.einsum("nk,nkd->nd", weights, array[corners]) for array in (part.vertices, normals))
-        heights = ((own.vertices - at) * unit(out)).sum(axis=1)
+        weights, heights = _lift(own.vertices, part.vertices[corners], normals[corners], weights)
         places = shape.wrinkle_places
         coarse = replace(
             shape,
             triangles=own.triangles,
-            colours=np.einsum("nk,nkc->nc", weights, shape.colours[corners]).astype(shape.colours.dtype),
+            colours=np.einsum("nk,nkc->nc", weights, shape.colours[corners])
+            .clip(0, 1)
+            .astype(shape.colours.dtype),
             sway=np.einsum("nk,nk->n", weights, shape.sway[corners]).astype(np.float32),
             texcoords=own.texcoords if shape.texcoords is not None else None,
             wrinkle_places=None if places is None else place_wrinkles(model, own),
@@ -166,6 +169,32 @@ def coarse_shapes(model: FaceModel, part: Part, shape: FaceShape) -> tuple[Coars
             )
         )  # fmt: skip
     return tuple(shapes)
+
+
+def _lift(places: Float32, corners: Float32, normals: Float32, weights: Float64) -> tuple[Float64, Float64]:
+    """Return weights (N, 3) of corners and heights (N,) along the normal there that give places (N, 3).
+
+    corners, normals: (N, 3, 3). weights: (N, 3), of the nearest point of each triangle. At a sharp edge the
+    normal there does not lead to the place: then weights a little outside the triangle are taken if those do.
+    """
+    sought, heights = weights, np.zeros(len(weights))
+    best, least = (weights, heights), np.full(len(weights), np.inf)
+    for _ in range(NEWTON_STEPS):
+        at, out = (np.einsum("nk,nkd->nd", sought, array) for array in (corners, normals))
+        off = places - at
+        along = (off * out).sum(axis=1) / np.maximum((out * out).sum(axis=1), 1e-12)
+        missed = np.linalg.norm(off - along[:, None] * out, axis=1)
+        better = (missed < least) & (np.abs(sought - 0.5).max(axis=1) <= FARTHEST_OUTSIDE + 0.5)
+        least = np.where(better, missed, least)
+        best = np.where(better[:, None], sought, best[0]), np.where(better, along, best[1])
+        moved = corners + along[:, None, None] * normals
+        axes = np.stack([moved[:, 1] - moved[:, 0], moved[:, 2] - moved[:, 0], out], axis=2).astype(
+            np.float64
+        )
+        axes[np.abs(np.linalg.det(axes)) < 1e-12] = np.eye(3)
+        step = np.linalg.solve(axes, (off - along[:, None] * out)[:, :, None])[:, :, 0]
+        sought = sought + np.stack([-step[:, 0] - step[:, 1], step[:, 0], step[:, 1]], axis=1)
+    return best
 
 
 def keep_triangles(shape: FaceShape, vertices: Bool, *, whole: bool) -> FaceShape:
