@@ -42,6 +42,9 @@ CORNERS = (0.45, 1.0)
 TURNS = np.radians([0, 30, 60, 90, 120, 150, 180, 225, 270, 315])
 """Places of the vertices around a crown, denser in front: behind, hardly anything is seen."""
 AROUND = len(TURNS)
+ABOVE_EDGE = 0.0013
+"""How far the wall within the crowns is from their edges, metres."""
+WALL_COLOUR = np.array([0.56, 0.47, 0.36])
 
 
 def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
@@ -160,7 +163,10 @@ def _place_tooth(tooth: Mesh, place: Float64, turn: float) -> Mesh:
 
 
 def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
-    """Return the mesh of the gum: a band along the arch, scalloped round the necks of the teeth."""
+    """Return the mesh of the gum: a band along the arch, scalloped round the necks of the teeth.
+
+    Within the crowns it goes on as a wall of their colour: coarse levels of detail would have gaps there.
+    """
     widths = np.array([float(row["width"]) for row in rows]) / 1000
     heights = np.array([float(row["height"]) for row in rows]) / 1000
     ends = np.concatenate([[0.0], np.cumsum(widths + 0.00008)])
@@ -172,16 +178,26 @@ def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
         low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
     middles = (ends[:-1] + ends[1:]) / 2
     sunk = np.interp(half, middles, SINKING * SUNK_GUM) if sign < 0 else np.zeros(len(half))
+    wall = ABOVE_EDGE + np.interp(half, middles, RISING if sign > 0 else -SINKING)
     positions = [_arch(length, sign) for length in half]
     # Out of the arch (mm), above the scallop (mm): the lower gum stays within the lip's inner side.
     under = ((0.7, 5.5), (-2.0, 9.5)) if sign > 0 else ((-1.2, 4.5), (-5.0, 9.5))
-    profile = [(-2.0, -0.4), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), *under, (-8.8, -0.4)]
+    profile = [
+        (-1.0, 0.0),
+        (-1.6, -0.8),
+        (-2.0, -0.4),
+        (0.15, -0.25),
+        (0.75, 0.35),
+        (1.05, 1.6),
+        *under,
+        (-8.8, -0.4),
+    ]
     band = np.zeros((len(profile), len(half), 3))
     for k, (place, turn) in enumerate(positions):
         outward = np.array([np.sin(turn), 0.0, np.cos(turn)])
         for row, (out, up) in enumerate(profile):
             reach = out / 1000 if out > -4 else out / 1000 * (1 + 0.15 * k / len(half))
-            away = low[k] + up / 1000 + sunk[k] * (1 - up / 9.5)
+            away = low[k] + up / 1000 + sunk[k] * (1 - up / 9.5) if row else wall[k]
             band[row, k] = place + outward * reach + np.array([0, sign * away, 0])
     mirrored = band[:, :0:-1] * (-1.0, 1.0, 1.0)
     band = np.concatenate([mirrored, band], axis=1)
@@ -193,7 +209,8 @@ def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
         triangles = triangles[:, ::-1].copy()
     shade = 1 - 0.40 * np.abs(np.linspace(-1, 1, columns)) ** 1.5
     colours = np.tile(GUM, (len(profile), columns, 1)) * shade[None, :, None]
-    colours[4:] *= np.linspace(0.95, 0.60, len(profile) - 4)[:, None, None]
+    colours[6:] *= np.linspace(0.95, 0.60, len(profile) - 6)[:, None, None]
+    colours[:2] *= WALL_COLOUR / GUM
     flat = np.concatenate([colours, np.full((*colours.shape[:2], 1), 0.6)], axis=2)
     return band.reshape(-1, 3) + front, triangles, flat.reshape(-1, 4)
 

@@ -155,9 +155,7 @@ def coarse_shapes(model: FaceModel, part: Part, shape: FaceShape) -> tuple[Coars
         coarse = replace(
             shape,
             triangles=own.triangles,
-            colours=np.einsum("nk,nkc->nc", weights, shape.colours[corners])
-            .clip(0, 1)
-            .astype(shape.colours.dtype),
+            colours=_mean_colours(shape.colours, part, parents, len(own.vertices)),
             sway=np.einsum("nk,nk->n", weights, shape.sway[corners]).astype(np.float32),
             texcoords=own.texcoords if shape.texcoords is not None else None,
             wrinkle_places=None if places is None else place_wrinkles(model, own),
@@ -169,6 +167,20 @@ def coarse_shapes(model: FaceModel, part: Part, shape: FaceShape) -> tuple[Coars
             )
         )  # fmt: skip
     return tuple(shapes)
+
+
+def _mean_colours(colours: Float32, part: Part, parents: Int32, count: int) -> Float32:
+    """Return (count, 4): the mean of the colours (V, 4) of a part around each vertex of a level.
+
+    parents: (V,), of each vertex of the part the one of the level. A corner of a coarse tooth has the colour
+    of the tooth, not of the dark between teeth.
+    """
+    corners = part.vertices[part.triangles]
+    twice = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = np.bincount(part.triangles.ravel(), np.repeat(twice, 3), len(colours)) + 1e-12
+    whole = np.bincount(parents, area, count)
+    sums = [np.bincount(parents, area * colour, count) for colour in colours.T]
+    return (np.stack(sums, axis=1) / np.maximum(whole, 1e-12)[:, None]).astype(colours.dtype)
 
 
 def _lift(places: Float32, corners: Float32, normals: Float32, weights: Float64) -> tuple[Float64, Float64]:
