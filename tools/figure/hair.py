@@ -156,7 +156,7 @@ def painted_height(positions: Float64, grown: Float64, hair: Hair) -> Float64:
     away = places.real * _metres(places) + 0.0012 * noise(positions, 0.004, 67)
     crossed = 0.006 * np.maximum(noise(positions, 0.006, 68), 0.0)  # by strands of the other side
     behind = 0.010 * smoothstep((0.95 - np.cos(places.imag)) / 0.7)
-    return np.minimum(height, 0.006 + crossed + behind + 6 * np.maximum(away, 0.0))
+    return np.minimum(height, 0.008 + crossed + behind + 6 * np.maximum(away, 0.0))
 
 
 def _cropped(positions: Float64) -> Float64:

@@ -178,7 +178,7 @@ def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
         low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
     middles = (ends[:-1] + ends[1:]) / 2
     sunk = np.interp(half, middles, SINKING * SUNK_GUM) if sign < 0 else np.zeros(len(half))
-    wall = ABOVE_EDGE + np.interp(half, middles, RISING if sign > 0 else -SINKING)
+    wall = ABOVE_EDGE + np.interp(half, middles, RISING if sign > 0 else SINKING)
     positions = [_arch(length, sign) for length in half]
     # Out of the arch (mm), above the scallop (mm): the lower gum stays within the lip's inner side.
     under = ((0.7, 5.5), (-2.0, 9.5)) if sign > 0 else ((-1.2, 4.5), (-5.0, 9.5))

@@ -18,6 +18,7 @@ from fba.face.fitting._photographs import Photograph
 from fba.face.fitting._points_file import FRONT_POINTS, HIDDEN, SIDE_POINTS, Points, check_inside
 from fba.face.fitting._skin import paint
 from fba.face.fitting._views import SKULL, Observation, View, first_view, fit_views, solve
+from fba.face.importers.assembly._repair import repair_tables
 from fba.geometry import fit_similarity
 from fba.parameters import point_rows
 
@@ -131,7 +132,10 @@ def fit_head(
     usual = float(np.linalg.norm(base.points[row["3.5"]] - base.points[row["3.6"]]))
     points *= (usual if eyes is None else eyes) / apart
     usual_face = with_average_forms(base)
-    model = fit(usual_face, _with_brows(points, usual_face.points), unit="m", name=name)
+    fitted = fit(usual_face, _with_brows(points, usual_face.points), unit="m", name=name)
+    model = repair_tables(
+        fitted, fitted
+    )  # a motion that folds such a face stops earlier
     views = fit_views(model.points, views, seen)
     return model, views, seen
 

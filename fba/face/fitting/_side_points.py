@@ -43,7 +43,7 @@ def find_side_points(photograph: Photograph) -> FoundPoints:
     name = photograph.name or "the picture"
     step = max(photograph.pixels.shape[0] // ROWS, 1)
     small = photograph.pixels[::step, ::step]
-    mask = _head_mask(small, name)
+    mask = find_head(small, name)
     sides = []
     for facing in (-1, 1):
         signal = _outline(mask, facing)
@@ -79,7 +79,7 @@ def find_side_points(photograph: Photograph) -> FoundPoints:
     return FoundPoints(places, 1.0, [step_shown])
 
 
-def _head_mask(pixels: UInt8, name: str) -> Bool:
+def find_head(pixels: UInt8, name: str) -> Bool:
     """Return the mask of the largest thing that differs from the background at the upper edges."""
     colour = pixels.astype(np.float64)
     edge = max(colour.shape[1] // 40, 2)

@@ -13,12 +13,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation, gaussian_filter
+from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
 
 from fba.arrays import Bool, Float32, Float64, Floating, Int32, UInt8
 from fba.errors import ModelError
 from fba.face import FaceModel
 from fba.face.fitting._photographs import Photograph
+from fba.face.fitting._side_points import find_head
 from fba.face.fitting._views import View
 from fba.face.model import Part
 from fba.mesh import read_pixels, vertex_normals
@@ -48,6 +49,10 @@ HIDDEN_DEPTH = 0.004
 """Metres behind the visible surface from which skin is hidden."""
 DEPTH_SIDE = 700
 """Pixels of the longer side of the picture of depths."""
+HEAD_EDGE = 2
+"""Pixels of that picture within the outline of a head before an even background that are not taken."""
+LEAST_ON_HEAD = 0.85
+"""Share of the feature points that must be on what is taken for the head."""
 TONES = 128
 """Width and height of the grid on which tones are compared."""
 HAIR = 0.085
@@ -146,6 +151,7 @@ class _Layer:
         self.rise = (chin[1, 1] - chin[0, 1]) / max(chin[0, 2] - chin[1, 2], 1e-3)
         self.chin = chin[0, 2]
         self._depth, self._factor = _depths(model, photograph, view)
+        self._head = _find_cover(model, photograph, view, self._depth.shape)
 
     def look_up(self, places: Float64, normals: Float64) -> tuple[Float32, Float32]:
         """Return linear colours (..., 3) and weights (...) of places on the skin (..., 3)."""
@@ -174,6 +180,7 @@ class _Layer:
         column = np.clip(grid[..., 0].astype(np.intp), 0, self._depth.shape[1] - 1)
         line = np.clip(grid[..., 1].astype(np.intp), 0, self._depth.shape[0] - 1)
         open_ = view.depth(places) > self._depth[line, column] - HIDDEN_DEPTH
+        open_ &= self._head[line, column]
         weight = share * smoothstep((facing - low) / (high - low)) * inside * open_
         return REFLECTED * _to_linear(_bilinear(self.pixels, x, y) / 255), weight.astype(np.float32)
 
@@ -204,6 +211,25 @@ def _depths(model: FaceModel, photograph: Photograph, view: View) -> tuple[Float
     known = numbers >= 0
     result[known] = depth[corners].min(axis=1)[numbers[known]]
     return result, factor
+
+
+def _find_cover(model: FaceModel, photograph: Photograph, view: View, shape: tuple[int, int]) -> Bool:
+    """Return the mask (H, W) of the head in a small copy of the picture; all where the background is uneven.
+
+    A fitted head is never exactly as wide as the person, and what is beside that is no skin.
+    """
+    pixels = photograph.pixels
+    rows, columns = (np.arange(most) * size // most for most, size in zip(shape, pixels.shape, strict=False))
+    try:
+        head = find_head(pixels[rows[:, None], columns], photograph.name)
+    except ModelError:
+        return np.ones(shape, dtype=bool)
+    head = binary_erosion(head, iterations=HEAD_EDGE)
+    bound = model.bound[model.bound >= 0]
+    at = view.project(model.vertices[bound].astype(np.float64)) / photograph.size * shape[::-1]
+    column, row = np.clip(at.astype(np.intp), 0, np.array(shape[::-1]) - 1).T
+    on_head = binary_dilation(head, iterations=3 * HEAD_EDGE)[row, column]
+    return head if on_head.mean() >= LEAST_ON_HEAD else np.ones(shape, dtype=bool)
 
 
 def _triangle_map(corners: Float64, shape: tuple[int, int]) -> Int32:

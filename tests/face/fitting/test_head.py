@@ -91,6 +91,18 @@ def test_its_skin_is_that_of_the_photographs(made: Made) -> None:
     assert made.head.seen > 0.7
 
 
+def test_what_is_beside_the_head_is_no_skin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The person's head is narrower than the fitted one, before an even green."""
+    monkeypatch.setattr(_skin, "SIZE", 512)
+    shot = photo(0, FRONT_POINTS, (30, 160, 40))
+    places = np.array(list(shot.points.values()))
+    left, right = (round(float(x)) for x in (places[:, 0].min() + 2, places[:, 0].max() - 2))
+    shot.photograph.pixels[40:, left:right] = (200, 120, 100)
+    pixels = read_pixels(head_from_photos(shot).model.part("skin").material.texture or b"")
+    assert pixels is not None
+    assert not (pixels[..., 1] > pixels[..., 0].astype(int) + 5).any()
+
+
 def test_measures_are_14_and_beside_the_built_in_head_s(made: Made) -> None:
     measures = made.head.measures
     assert [one.view for one in measures] == ["profile"] * 6 + ["front"] * 8
