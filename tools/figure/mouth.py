@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from meshes import Mesh, join, mirror, tube
 
-from fba.arrays import Float64
+from fba.arrays import Float64, Integer
 
 ENAMEL = np.array([0.78, 0.68, 0.55])
 """Linear light."""
@@ -42,8 +42,8 @@ CORNERS = (0.45, 1.0)
 TURNS = np.radians([0, 30, 60, 90, 120, 150, 180, 225, 270, 315])
 """Places of the vertices around a crown, denser in front: behind, hardly anything is seen."""
 AROUND = len(TURNS)
-ABOVE_EDGE = 0.0013
-"""How far the wall within the crowns is from their edges, metres."""
+WALLED, ABOVE_EDGE = 5, 0.0013
+"""How many crowns of each side have a wall within, and how far that is from their edges, metres."""
 WALL_COLOUR = np.array([0.56, 0.47, 0.36])
 
 
@@ -74,7 +74,7 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
     points = {"edge": int(score.argmax())}
     gum = _gum(front, sign, rows)
     start = sum(len(mesh[0]) for mesh in meshes)
-    meshes.append(gum)
+    meshes += [gum, _wall(front, sign, rows)]
     middle = np.flatnonzero(np.abs(gum[0][:, 0]) < 1e-9)
     high = middle[(gum[0][middle, 1] * sign).argmax()]
     points["root"] = start + int(high)
@@ -163,13 +163,8 @@ def _place_tooth(tooth: Mesh, place: Float64, turn: float) -> Mesh:
 
 
 def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
-    """Return the mesh of the gum: a band along the arch, scalloped round the necks of the teeth.
-
-    Within the crowns it goes on as a wall of their colour: coarse levels of detail would have gaps there.
-    """
-    widths = np.array([float(row["width"]) for row in rows]) / 1000
-    heights = np.array([float(row["height"]) for row in rows]) / 1000
-    ends = np.concatenate([[0.0], np.cumsum(widths + 0.00008)])
+    """Return the mesh of the gum: a band along the arch, scalloped round the necks of the teeth."""
+    widths, heights, ends = _row(rows)
     half = np.linspace(0, ends[-1] - 0.0005, 32)
     low = np.zeros(len(half))
     for k, length in enumerate(half):
@@ -178,41 +173,55 @@ def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
         low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
     middles = (ends[:-1] + ends[1:]) / 2
     sunk = np.interp(half, middles, SINKING * SUNK_GUM) if sign < 0 else np.zeros(len(half))
-    wall = ABOVE_EDGE + np.interp(half, middles, RISING if sign > 0 else SINKING)
     positions = [_arch(length, sign) for length in half]
     # Out of the arch (mm), above the scallop (mm): the lower gum stays within the lip's inner side.
     under = ((0.7, 5.5), (-2.0, 9.5)) if sign > 0 else ((-1.2, 4.5), (-5.0, 9.5))
-    profile = [
-        (-1.0, 0.0),
-        (-1.6, -0.8),
-        (-2.0, -0.4),
-        (0.15, -0.25),
-        (0.75, 0.35),
-        (1.05, 1.6),
-        *under,
-        (-8.8, -0.4),
-    ]
+    profile = [(-2.0, -0.4), (0.15, -0.25), (0.75, 0.35), (1.05, 1.6), *under, (-8.8, -0.4)]
     band = np.zeros((len(profile), len(half), 3))
     for k, (place, turn) in enumerate(positions):
         outward = np.array([np.sin(turn), 0.0, np.cos(turn)])
         for row, (out, up) in enumerate(profile):
             reach = out / 1000 if out > -4 else out / 1000 * (1 + 0.15 * k / len(half))
-            away = low[k] + up / 1000 + sunk[k] * (1 - up / 9.5) if row else wall[k]
+            away = low[k] + up / 1000 + sunk[k] * (1 - up / 9.5)
             band[row, k] = place + outward * reach + np.array([0, sign * away, 0])
-    mirrored = band[:, :0:-1] * (-1.0, 1.0, 1.0)
-    band = np.concatenate([mirrored, band], axis=1)
+    band, triangles = _sheet(band, sign)
     columns = band.shape[1]
-    grid = np.arange(len(profile) * columns).reshape(len(profile), columns)
-    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
-    triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
-    if sign < 0:
-        triangles = triangles[:, ::-1].copy()
     shade = 1 - 0.40 * np.abs(np.linspace(-1, 1, columns)) ** 1.5
     colours = np.tile(GUM, (len(profile), columns, 1)) * shade[None, :, None]
-    colours[6:] *= np.linspace(0.95, 0.60, len(profile) - 6)[:, None, None]
-    colours[:2] *= WALL_COLOUR / GUM
+    colours[4:] *= np.linspace(0.95, 0.60, len(profile) - 4)[:, None, None]
     flat = np.concatenate([colours, np.full((*colours.shape[:2], 1), 0.6)], axis=2)
     return band.reshape(-1, 3) + front, triangles, flat.reshape(-1, 4)
+
+
+def _wall(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
+    """Return a strip within the front crowns, of their colour: coarse levels of detail show no gaps."""
+    _, heights, ends = _row(rows)
+    middles = (ends[:-1] + ends[1:]) / 2
+    band = np.zeros((2, 2 * WALLED + 1, 3))
+    for k, length in enumerate(np.sort(np.r_[ends[: WALLED + 1], middles[:WALLED]])):
+        place, turn = _arch(length, sign)
+        low = ABOVE_EDGE + np.interp(length, middles, RISING if sign > 0 else SINKING)
+        for row, (back, away) in enumerate(
+            ((0.0010, low), (0.0016, 0.75 * np.interp(length, middles, heights)))
+        ):
+            band[row, k] = place - back * np.array([np.sin(turn), 0.0, np.cos(turn)]) + (0, sign * away, 0)
+    band, triangles = _sheet(band, sign)
+    return band.reshape(-1, 3) + front, triangles, np.tile([*WALL_COLOUR, 0.6], (band.shape[1] * 2, 1))
+
+
+def _row(rows: list[dict[str, str]]) -> tuple[Float64, Float64, Float64]:
+    """Return widths and heights (N,) of the teeth of a side, and where they end along the arch (N + 1,)."""
+    widths, heights = (np.array([float(row[name]) for row in rows]) / 1000 for name in ("width", "height"))
+    return widths, heights, np.concatenate([[0.0], np.cumsum(widths + 0.00008)])
+
+
+def _sheet(band: Float64, sign: float) -> tuple[Float64, Integer]:
+    """Return rows of points (R, C, 3) of the left side with those of the right, and their triangles."""
+    band = np.concatenate([band[:, :0:-1] * (-1.0, 1.0, 1.0), band], axis=1)
+    grid = np.arange(band.shape[0] * band.shape[1]).reshape(band.shape[:2])
+    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
+    triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    return band, triangles if sign > 0 else triangles[:, ::-1].copy()
 
 
 def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:

@@ -39,7 +39,7 @@ TEXTURE_BYTES = 60_000
 """Pictures with more bytes are stored smaller."""
 TEXTURE_SIZE = 1024
 """Pixels that the wider side of such a picture keeps."""
-TEXTURE_QUALITY = 45
+TEXTURE_QUALITY = 29
 COORDINATE_STEP = 1 / 8192
 SWAY_STEP = 1 / 8192
 HAIR_STEP = 1 / 127
