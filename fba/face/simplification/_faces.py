@@ -49,7 +49,7 @@ lids closed with a broad grin, the lips apart with wide eyes, and the lips pushe
 and lids that meet half way."""
 BROAD_FAPS = (3, 14, 15, 16, 17)
 """FAPs that move half the face: what they move is not important for that alone."""
-IMPORTANCE = 190.0
+IMPORTANCE = 210.0
 """Importance of what a FAP moves most, lips and lids, compared to what none moves."""
 LID_FAPS = (19, 20, 21, 22)
 LID_SHARE = 7.0
@@ -58,7 +58,7 @@ EYE_SHARE = 0.5
 """Share of that motion for which eyeballs count."""
 LASH_SHARE = 0.5
 """The same for lashes: a hair has little area, yet its lack is seen."""
-TEETH_SHARE, LEAST_TEETH = 1.0, 0.05
+TEETH_SHARE, LEAST_TEETH = 0.9, 0.2
 """The same for the front of teeth, which stand out against the dark behind them, and the factor of this for
 their backs."""
 TONGUE_SHARE = 0.2
