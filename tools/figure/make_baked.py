@@ -18,6 +18,7 @@ from fba_player._figure._face_parts import cast_coarsely
 from fba_player._figure.baked_shapes import FOLDER, file_name, pack
 from fba_player._figure.body_light import build_body_light
 from fba_player._figure.face import FaceFigure, build_figure
+from fba_player._figure.far_head import find_collapses
 from fba_player._figure.person import body_shape
 
 
@@ -28,6 +29,9 @@ def bake_face(figure: FaceFigure) -> dict[str, Array]:
         outer = cast_coarsely(shape, figure.model.part(name), {}).outer
         if outer is not None:
             arrays[f"{name}/outer"] = outer.astype(np.uint16)
+        if shape.levels:
+            far = find_collapses(figure, figure.model.part(name), shape.levels[-1])
+            arrays[f"{name}/far"] = far.astype(np.uint16)
     return arrays
 
 

@@ -39,17 +39,23 @@ class DetailLevels:
 
     def triangles_within(self, tolerance: float) -> Int32 | None:
         """Return int32 (F, 3): the coarsest triangles with at most this error (m); None for all."""
-        level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
-        if level < 0 or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
+        if tolerance < TOLERANCES[0] or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
             return None
+        return _without_flat(self.targets_within(tolerance)[self.triangles])
+
+    def targets_within(self, tolerance: float) -> Int32:
+        """Return int32 (V,): the vertex onto which each has collapsed with at most this error (m)."""
+        level = int(np.searchsorted(TOLERANCES, tolerance, side="right")) - 1
+        target = np.arange(len(self.points), dtype=np.int32)
+        if level < 0 or len(self.triangles) < MIN_TRIANGLES or not is_compiled():
+            return target
         onto, first = self.collapses
-        target = np.arange(len(onto), dtype=np.int32)
         collapses = first <= level
         for _ in range(MAX_PASSES * len(TOLERANCES)):  # no more steps than passes were made
             if not collapses[target].any():
                 break
             target = np.where(collapses[target], onto[target], target)
-        return _without_flat(target[self.triangles])
+        return target
 
     @cached_property
     def collapses(self) -> tuple[Int32, Int32]:

@@ -21,6 +21,7 @@ from fba_player._figure.body_light import BodyLight, build_body_light
 from fba_player._figure.detail import choose_level, needed_vertices
 from fba_player._figure.face import FaceFigure
 from fba_player._figure.face_light import FaceLight
+from fba_player._figure.far_head import add_far_level
 from fba_player._figure.wrinkles import wrinkle_strengths
 from fba_player.view._view import Eye, FaceMesh, FaceShape, Seen
 
@@ -243,7 +244,7 @@ def _face_shapes(figure: FaceFigure, head: AttachedHead) -> dict[str, FaceShape]
         part = model.part(name)
         if part.kind == "other" and part.vertices[:, 1].max() < chin:
             continue
-        coarse = cast_coarsely(shape, part, stored)
+        coarse = add_far_level(figure, part, cast_coarsely(shape, part, stored), stored)
         visible = keep_triangles(coarse, ~head.hidden[figure.rows(name)], whole=False)
         if len(visible.triangles):
             whole = head.brings_neck and part.kind == "skin"

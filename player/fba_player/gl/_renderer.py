@@ -142,13 +142,14 @@ class Renderer:
             self._draw_eye(ball, eye, pixel)
         gl.disable(gl.CULL_FACE)
         self._faces.draw_transparent(drawn.faces)
+        steps = Steps([], np.zeros((0, 2), dtype=np.float32))
+        if smoothed:  # before annotations, which wait for the depths of what is drawn
+            shells = [] if view.extras is None else view.extras.shells
+            outlined = replace(drawn, faces=[*drawn.faces, *shells])
+            steps = find_steps(outlined, matrix, size, self._outliner)
         if view.extras is not None:
             self._extras.draw(view.extras, camera, size)
-        if not smoothed:
-            return Steps([], np.zeros((0, 2), dtype=np.float32))
-        if view.extras is not None:
-            drawn = replace(drawn, faces=[*drawn.faces, *view.extras.shells])
-        return find_steps(drawn, matrix, size, self._outliner)
+        return steps
 
     def _set_camera(self, *seen: object) -> None:
         """Set the camera in all programs: its position, the matrix to clip space, a pixel's size."""

@@ -12,6 +12,7 @@ from fba_player._figure.baked_shapes import load_baked, pack, unpack
 from fba_player._figure.body_light import build_body_light
 from fba_player._figure.face import build_figure
 from fba_player._figure.face_light import unpack_light
+from fba_player._figure.far_head import find_collapses
 from fba_player._figure.person import body_shape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all vertices count as free")
@@ -38,6 +39,16 @@ def test_the_light_on_the_head_is_as_computed() -> None:
     assert outer is not None
     assert len(outer) < len(skin.triangles) / 10
     np.testing.assert_array_equal(outer, stored["skin/outer"], err_msg=STALE)
+
+
+@pytest.mark.parametrize("name", figures.FIGURES)
+def test_far_heads_are_as_computed(name: str) -> None:
+    figure = build_figure(figures.face(name))
+    stored = load_baked(figure.model.parts)
+    for part, shape in figure.shapes.items():
+        if shape.levels:
+            far = find_collapses(figure, figure.model.part(part), shape.levels[-1])
+            np.testing.assert_array_equal(far, stored[f"{part}/far"], err_msg=STALE)
 
 
 def test_the_body_is_as_computed() -> None:
