@@ -294,17 +294,26 @@ def check_inside(checked: Checked, poses: Iterable[tuple[str, Float32]]) -> Iter
 def hand_depths(body: BodyModel, joints: Float64) -> tuple[float, int]:
     """Return how deep hands are in thighs, metres, and how many vertices of hands, for joints (J, 4, 4).
 
-    The depth is that below the plane through the nearest vertex of a thigh.
+    The depth is that below the plane through the nearest vertex of a thigh, where the hand is below that
+    through the nearest of trunk and legs as well: a thigh has no skin where it meets the trunk.
     """
     names, owner = body.skeleton.names, body.joints[np.arange(len(body.joints)), body.weights.argmax(axis=1)]
     positions, normals = np.empty_like(body.vertices), np.empty_like(body.vertices)
     body.skin(joints, positions, normals)
-    wrists = [body.skeleton.descendants(names.index(f"{side}_wrist")) for side in "lr"]
-    hands = positions[np.isin(owner, np.concatenate(wrists))]
+    wrists, arms = (
+        np.concatenate([body.skeleton.descendants(names.index(f"{side}_{joint}")) for side in "lr"])
+        for joint in ("wrist", "shoulder")
+    )
+    hands = positions[np.isin(owner, wrists)]
     thighs = np.isin(owner, [names.index("l_hip"), names.index("r_hip")])
-    away, nearest = cKDTree(positions[thighs]).query(hands, distance_upper_bound=THIGH_REACH)
-    at, near = nearest[np.isfinite(away)], hands[np.isfinite(away)]
-    depth = -((near - positions[thighs][at]) * normals[thighs][at]).sum(axis=1)
+    away, _ = cKDTree(positions[thighs]).query(hands, distance_upper_bound=THIGH_REACH)
+    near = hands[np.isfinite(away)]
+
+    def below(among: Bool) -> Float64:
+        _, at = cKDTree(positions[among]).query(near)
+        return -((near - positions[among][at]) * normals[among][at]).sum(axis=1)
+
+    depth = np.where(below(~np.isin(owner, arms)) > 0, below(thighs), 0.0)
     return float(depth.max(initial=0.0)), int((depth > HAND_DEPTH).sum())
 
 

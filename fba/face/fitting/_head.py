@@ -133,9 +133,7 @@ def fit_head(
     points *= (usual if eyes is None else eyes) / apart
     usual_face = with_average_forms(base)
     fitted = fit(usual_face, _with_brows(points, usual_face.points), unit="m", name=name)
-    model = repair_tables(
-        fitted, fitted
-    )  # a motion that folds such a face stops earlier
+    model = repair_tables(fitted, fitted)  # a motion that folds such a face stops earlier
     views = fit_views(model.points, views, seen)
     return model, views, seen
 
