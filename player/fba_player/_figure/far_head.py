@@ -13,6 +13,7 @@ import numpy as np
 from fba.arrays import Float32, Int32
 from fba.face import Part
 from fba.mesh.simplify import DetailLevels
+from fba.parameters import FAP_COUNT
 from fba_player._figure._face_parts import NORMAL_WEIGHT
 from fba_player._figure.face import FaceFigure
 from fba_player._figure.face_light import CLOSED, MOUTH_OPEN, UPPER_LIDS
@@ -77,7 +78,7 @@ def _pose(
     figure: FaceFigure, part: Part, level: CoarseShape, faps: dict[int, int]
 ) -> tuple[Float32, Float32]:
     """Return positions and normals (M, 3) of a level's vertices for some FAPs."""
-    values = np.zeros(68, dtype=np.float32)
+    values = np.zeros(FAP_COUNT, dtype=np.float32)
     for fap, value in faps.items():
         values[fap - 1] = value
     normals = np.empty((len(figure.model.vertices), 3), dtype=np.float32)
