@@ -68,13 +68,14 @@ def _mouth() -> dict[str, Float]:
     say, held = speech()
     smile, grin = key["smile"], key["grin"] * (1 - held)
     press = key["press"] * (1 - held)
-    spread = smile * (1 - 0.45 * held)
+    rounded = np.clip(say["push"] / 250, 0, 1)
+    spread = smile * (1 - 0.45 * held) * (1 - 0.6 * rounded)
     top = say["top"] + 95 * grin + 25 * smile * held - 35 * press
     bottom = say["bottom"] + 150 * grin - 60 * press
     middle = {"top": top, "bottom": bottom}
     half = {"top": 0.88 * top + 130 * spread, "bottom": 0.86 * bottom - 150 * spread}
-    width = say["width"] + 150 * spread
-    corner = 430 * spread - 12 * np.clip(say["push"], 0, None) / 100
+    width = say["width"] + 110 * spread
+    corner = 430 * spread - 0.5 * say["jaw"] * rounded
     jaw = say["jaw"] + 60 * grin
     curves = {
         "open_jaw": np.maximum(jaw, 0),
