@@ -48,6 +48,7 @@ def main() -> None:
     for path in set(FOLDER.glob("*.png")) - {case.path for case in cases().values()}:
         print(f"{path.name} belongs to no case: remove it")  # noqa: T201
     if options.sheet is not None:
+        options.sheet.parent.mkdir(parents=True, exist_ok=True)
         sheet(shown).save(options.sheet)
 
 
