@@ -3,8 +3,9 @@
     python -m tools.remake                       # all of it, about a quarter of an hour
     python -m tools.remake head references       # the steps named
 
-After a change of the figures, or of the definitions of visemes and expressions, what is made from them is out of
-date, and tests fail. `git status` says what has changed; look at the references (out/sheet.png) and the pictures.
+After a change of the figures, or of the definitions of visemes and expressions, what is made from them is
+out of date, and tests fail. `git status` says what has changed; look at the references (out/sheet.png) and
+the pictures.
 """
 
 from __future__ import annotations
