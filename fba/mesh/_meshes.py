@@ -37,6 +37,11 @@ class Material:
     cutoff: float = 0.5
     two_sided: bool = False
 
+    @property
+    def gloss(self) -> float:
+        """What vertices without a gloss of their own have; never 0, which is that of hair painted on skin."""
+        return max(1.0 - self.roughness, 0.03)
+
 
 def vertex_normals(vertices: Floating, triangles: Integer) -> Float32:
     """Return unit normals weighted by area: float32 (V, 3); +z where no triangle touches a vertex."""

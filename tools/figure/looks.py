@@ -37,7 +37,8 @@ class Hair:
 class Looks:
     """One figure. Colours of the skin are sRGB, 0..255; of eyes and clothes, linear light.
 
-    brow_height: of the brows, relative to the first figure's. lines: depth of the lines of an old skin, 0..1.
+    brow_height: of the brows, relative to the first figure's. beard: how far its shade
+    shows, 0..1. lines: depth of the lines of an old skin, 0..1.
     gloss: of the skin, relative to the first figure's.
     iris: inner and outer colour. shirt, trousers, shoes: factors of the first figure's colours.
     """
@@ -56,6 +57,7 @@ class Looks:
     scalp: Colour
     brow: Colour
     brow_height: float = 1.0
+    beard: float = 0.0
     lines: float = 0.0
     gloss: float = 1.0
     iris: tuple[Colour, Colour] = ((0.30, 0.17, 0.065), (0.075, 0.105, 0.100))
@@ -72,7 +74,7 @@ ALEX = Looks(
     ),
     skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
     waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(191, 114, 103), lip_line=(146, 78, 71),
-    freckle=(178, 118, 92), scalp=(96, 72, 60), brow=(60, 44, 34),
+    freckle=(178, 118, 92), scalp=(96, 72, 60), brow=(60, 44, 34), beard=0.35,
 )  # fmt: skip
 """The built-in person: a young man with brown hair."""
 RUTH = Looks(

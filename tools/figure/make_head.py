@@ -197,9 +197,9 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     y, z = surface.vertices[:, 1], surface.vertices[:, 2]
     oily = 1 - smoothstep(np.abs(surface.vertices[:, 0]) / 0.03)
     oily = oily * smoothstep((z + 0.01) / 0.02) * smoothstep((y + 0.05) / 0.03)
-    gloss = 0.34 + 0.09 * oily + 0.13 * lips + 0.05 * wet - 0.15 * wet * (marks.lip > 0) + 0.2 * lids
+    gloss = 0.32 + 0.14 * oily + 0.13 * lips + 0.05 * wet - 0.15 * wet * (marks.lip > 0) + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
-    colours[:, 3] = gloss * (1 - cropped) + 0.04 * cropped
+    colours[:, 3] = gloss * (1 - cropped)  # 0: light does not scatter in hair
     inside = near & (ring < 0)
     # The throat is darker than the cheeks.
     cheek = smoothstep((np.abs(surface.vertices[:, 0]) - 0.012) / 0.018)

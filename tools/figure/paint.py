@@ -17,16 +17,16 @@ from fba.sampling import smoothstep
 
 SIZE = 2048
 
-MOUTH = np.array([158, 76, 72.0])
+MOUTH, BEARD = np.array([158, 76, 72.0]), np.array([146, 120, 118.0])
 """sRGB, 0..255."""
 MAX_STEP = 0.003
 """Metres: farther apart than this, texels are on both sides of a seam."""
-HAIR_WIDTH = 0.00023
+HAIR_WIDTH = 0.00016
 """Metres."""
-BROW_STROKES = ((1600, 0.0), (700, 0.25))
+BROW_STROKES = ((1900, 0.0), (800, 0.25))
 """Of both brows: how many hairs, and how far their colour is towards that of the skin."""
-SPARSEST = 0.10
-"""Density of a brow below which no hair grows: none stands apart."""
+SPARSEST = 0.03
+"""Density of a brow below which no hair grows."""
 TAPER = ((1.0, 110), (0.7, 190), (0.4, 255))
 """Shares of a brow's hair from its root, and how opaque they are, 0..255: it ends in a point."""
 BROW = np.array([
@@ -103,8 +103,8 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     colour = _eyes(colour, p, ring_eye, looks)
     colour = _mouth(colour, p, ring_mouth, lip_side, looks)
     colour = _ears(colour, p)
-    colour = _hair(colour, p, _grown_chart(chart), looks)
-    colour = _blend(colour, np.array(looks.brow), 0.22 * brow(p, looks.brow_height)[1])
+    colour = _hair(colour, p, _grown_chart(chart, looks), looks)
+    colour = _blend(colour, np.array(looks.brow), 0.26 * brow(p, looks.brow_height)[1])
     image = np.zeros((*chart.known.shape, 3))
     image[chart.known] = colour
     image = _fill_unknown(image, chart.known)
@@ -114,13 +114,16 @@ def paint(chart: Chart, looks: Looks) -> Image.Image:
     return Image.fromarray(filled.astype(np.uint8))
 
 
-def _grown_chart(chart: Chart) -> tuple[Float64, Float64]:
+def _grown_chart(chart: Chart, looks: Looks) -> tuple[Float64, Float64]:
     """Return (N, 3) positions of known texels with hair, and (N, 3) metres from each to the texel below; 0 at
     seams."""
     grown = chart.values_at[..., 3:]
     step = np.gradient(grown, axis=0)[chart.known]
     near = np.linalg.norm(step, axis=1, keepdims=True) < MAX_STEP
-    return grown[chart.known], np.where(near, step, 0.0)
+    grown = grown[chart.known]
+    if not looks.hair.curly:  # neither strands nor their parting run straight
+        grown = grown + np.stack([0.005 * noise(grown, 0.032, 51 + k) for k in range(3)], axis=1)
+    return grown, np.where(near, step, 0.0)
 
 
 def _hair(colour: Float64, p: Float64, grown: tuple[Float64, Float64], looks: Looks) -> Float64:
@@ -133,13 +136,16 @@ def _hair(colour: Float64, p: Float64, grown: tuple[Float64, Float64], looks: Lo
     above, hair = above[near], looks.hair
     tone, cover = paint_locks(grown[0][near], grown[1][near], above, hair)
     strands = np.stack([np.interp(tone, TONES, [c[k] for c in hair.colours]) for k in range(3)], axis=1)
-    # Through sparse hair skin is seen, in the shade.
-    below = _blend(colour[near], np.array(looks.scalp), smoothstep((above + 0.006) / 0.020) * 0.85)
+    # Through sparse hair skin is seen, in the shade, which reaches beyond its edge above the ears.
+    shade = 0.22 * smoothstep((above + 0.011) / 0.012) * smoothstep((p[near, 1] - 0.015) / 0.03)
+    below = _blend(
+        colour[near] * (1 - shade[:, None]), np.array(looks.scalp), smoothstep(above / 0.014) * 0.85
+    )
     colour[near] = _blend(below, strands, cover)
     return colour
 
 
-def encode_jpeg(picture: Image.Image, quality: int = 86) -> bytes:
+def encode_jpeg(picture: Image.Image, quality: int = 84) -> bytes:
     """Return the picture as a JPEG file."""
     buffer = io.BytesIO()
     picture.save(buffer, "JPEG", quality=quality, optimize=True, subsampling=0)
@@ -168,19 +174,29 @@ def _complexion(p: Float64, looks: Looks) -> Float64:
     colour = _blend(colour, np.array(looks.neck), smoothstep((-0.095 - p[:, 1]) / 0.05) * 0.9)
     broad = 0.85 + 0.3 * noise(p, 0.011, 1)
     for centre, radius, share in (
-        ((40, -37, -4), 48, 0.42), ((0, -38, 33), 22, 0.40), ((14, -40, 14), 14, 0.30),
+        ((40, -37, -4), 48, 0.50), ((0, -38, 33), 22, 0.60), ((14, -40, 14), 14, 0.50),
         ((0, -104, 6), 26, 0.30), ((24, -66, 8), 16, 0.20),
-        ((84, -15, -98), 44, 0.12), ((0, 40, 12), 40, 0.10),
+        ((84, -15, -98), 36, 0.40), ((0, 40, 12), 40, 0.10),
     ):  # fmt: skip
         colour = _blend(colour, np.array(looks.blush), _spot(p, centre, radius) * share * broad)
     colour += np.array([3.4, 2.8, 2.4]) * (noise(p, 0.018, 2) * 0.9 + noise(p, 0.007, 3) * 0.9)[:, None]
-    red = noise(p, 0.0042, 4)[:, None] * np.array([1.4, -3.2, -3.2])
-    fine = noise(p, 0.0011, 5)[:, None] * np.array([4.2, 4.2, 4.0])
-    pores = np.clip(noise(p, 0.00065, 6) - 0.45, 0, 1)[:, None]
+    colour = _blend(colour, BEARD, looks.beard * _beard(p))
+    red = (noise(p, 0.0042, 4) + 0.8 * noise(p, 0.010, 14))[:, None] * np.array([1.8, -4.8, -4.8])
+    fine = noise(p, 0.0011, 5)[:, None] * np.array([5.0, 5.0, 4.8])
+    pores = np.clip(noise(p, 0.00065, 6) - 0.30, 0, 0.4)[:, None]
     nose = np.clip(_spot(p, (6, -34, 24), 26) + _spot(p, (28, -34, 6), 26) * 0.7, 0, 1)[:, None]
-    colour += red + fine - pores * (14 + 30 * nose) * np.array([0.8, 1.0, 1.0])
+    colour += (
+        red * np.array(looks.skin) / ALEX.skin + fine - pores * (17 + 17 * nose) * np.array([0.8, 1.0, 1.0])
+    )
     freckle = smoothstep((noise(p, 0.0021, 7) - 0.62) / 0.2) * smoothstep((noise(p, 0.010, 8) + 0.2) / 0.8)
-    return _blend(colour, np.array(looks.freckle), freckle * 0.30 * _spot(p, (24, -26, 8), 42))
+    return _blend(colour, np.array(looks.freckle), freckle * 0.42 * _spot(p, (24, -26, 8), 42))
+
+
+def _beard(p: Float64) -> Float64:
+    """Return (N,) how much of a shaven beard shows: a shade of single hairs."""
+    spots = (((0, -58, 20), 32), ((0, -100, 6), 58), ((36, -86, -8), 50), ((62, -62, -52), 52))
+    grown = np.max([_spot(p, centre, radius) for centre, radius in spots], axis=0)
+    return grown * (0.7 + 0.6 * np.clip(noise(p, 0.0007, 15), 0, 1) + 0.25 * noise(p, 0.006, 16))
 
 
 LINES = (
@@ -219,13 +235,13 @@ def _lines(colour: Float64, p: Float64, looks: Looks) -> Float64:
 
 EARS = (
     # points (z, y) of a fold of the ear, mm; its half width, mm; and how much darker it is, 0..1
-    (((-89, -1), (-96, -1), (-101, -6), (-102.5, -16), (-100, -25), (-96, -32)), 1.5, 0.30),  # scapha
-    (((-88, -5), (-92, -5), (-96, -8)), 2.2, 0.19),  # triangular fossa
-    (((-93, -2), (-97, -8), (-98.5, -15), (-96.5, -24), (-92, -30)), 1.3, -0.12),  # antihelix
-    (((-86, -9), (-91, -9), (-96, -12)), 1.0, -0.07),  # its lower crus
-    (((-88, -17), (-92, -20), (-91, -26), (-86, -29)), 4.0, 0.24),  # concha
-    (((-83, -15), (-82, -20), (-83, -26)), 1.6, 0.30),  # behind the tragus
-    (((-85, -30), (-87, -32)), 1.6, 0.16),  # below it
+    (((-89, -1), (-96, -1), (-101, -6), (-102.5, -16), (-100, -25), (-96, -32)), 1.5, 0.46),  # scapha
+    (((-88, -5), (-92, -5), (-96, -8)), 2.2, 0.29),  # triangular fossa
+    (((-93, -2), (-97, -8), (-98.5, -15), (-96.5, -24), (-92, -30)), 1.3, -0.19),  # antihelix
+    (((-86, -9), (-91, -9), (-96, -12)), 1.0, -0.11),  # its lower crus
+    (((-88, -17), (-92, -20), (-91, -26), (-86, -29)), 4.0, 0.37),  # concha
+    (((-83, -15), (-82, -20), (-83, -26)), 1.6, 0.46),  # behind the tragus
+    (((-85, -30), (-87, -32)), 1.6, 0.25),  # below it
 )
 """Folds of the left ear that the surface only hints at."""
 
@@ -287,6 +303,7 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Loo
     soft = np.where(lower, 2.6, 1.8)
     red = np.where(near, smoothstep((border + 0.45 * soft - ring) / soft), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
+    lines = np.where(lines < 0, 2.2 * lines, lines)  # creases
     lip = (
         np.array(looks.lip)
         + lines[:, None] * np.where(lower[:, None], [13, 12, 11.0], [10, 10, 9.0])
@@ -330,9 +347,10 @@ def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
     weight = area[rows, columns] * np.where(density > SPARSEST, density, 0.0)
     for count, pale in BROW_STROKES:
         chosen = random.choice(len(p), count, p=weight / weight.sum())
+        chosen = chosen[np.argsort(density[chosen])]  # hairs of the edges are fainter, and below the others
         colour = np.array(looks.brow) * (1 - pale) + np.array(looks.skin) * pale
-        layers.append((chosen, _brow_hairs(p[chosen], along[chosen], random), colour, 0.85, TAPER))
-    for chosen, direction, colour, strength, taper in layers:
+        layers.append((chosen, _brow_hairs(p[chosen], along[chosen], random), colour))
+    for chosen, direction, colour in layers:
         mask = Image.new("L", (SIZE * 2, SIZE * 2), 0)
         draw = ImageDraw.Draw(mask)
         roots = np.stack([columns[chosen], rows[chosen]], axis=1).astype(np.float64)
@@ -342,22 +360,24 @@ def _strokes(picture: Image.Image, chart: Chart, looks: Looks) -> None:
         good = np.abs(move).max(axis=1) < 90
         # Where texels are small, a hair is wide in texels.
         wide = np.clip(np.round(2 * HAIR_WIDTH / np.sqrt(area[rows[chosen], columns[chosen]])), 1, 8)
-        for (x0, y0), (dx, dy), width in zip(roots[good] * 2, move[good] * 2, wide[good], strict=True):
+        full = (0.25 + 0.75 * np.clip(1.5 * density[chosen], 0, 1)) * random.uniform(0.5, 1.0, len(chosen))
+        hairs = zip(roots[good] * 2, move[good] * 2, wide[good], full[good], strict=True)
+        for (x0, y0), (dx, dy), width, most in hairs:
             x, y = x0 - dx / 2, y0 - dy / 2
-            for share, fill in taper:
-                draw.line((x, y, x + dx * share, y + dy * share), fill=fill, width=int(width))
+            for share, fill in TAPER:
+                draw.line((x, y, x + dx * share, y + dy * share), fill=int(most * fill), width=int(width))
         blurred = mask.resize((SIZE, SIZE), Image.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.5))
-        faded = blurred.point(lambda value, s=strength: int(value * s))
-        picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in colour)), (0, 0), faded)
+        picture.paste(Image.new("RGB", picture.size, tuple(int(c) for c in colour)), (0, 0), blurred)
 
 
 def _brow_hairs(p: Float64, along: Float64, random: np.random.Generator) -> Float64:
     """Return (N, 3) hairs of the brow, metres: upwards at its inner end, then outwards, last downwards."""
-    angle = np.interp(along, [0.0, 0.2, 0.6, 1.0], [64.0, 38.0, 12.0, -24.0]) + random.normal(0, 9, len(p))
+    angle = np.interp(along, [0.0, 0.2, 0.6, 1.0], [64.0, 38.0, 12.0, -24.0])
+    angle += random.normal(0, 1, len(p)) * np.interp(along, [0.0, 0.4], [20.0, 10.0])
     middle = np.interp(np.abs(p[:, 0]), [0.012, 0.035, 0.06], [0.0148, 0.0232, 0.0135])
     angle = np.radians(angle - np.clip((p[:, 1] - middle) / 0.003, -1, 1) * 22)
     sampled = np.stack([np.cos(angle) * np.sign(p[:, 0]), np.sin(angle), np.zeros(len(p))], axis=1)
-    ends = np.interp(along, [0.0, 0.15, 0.7, 1.0], [0.75, 1.0, 1.0, 0.6])[:, None]
+    ends = np.interp(along, [0.0, 0.25, 0.7, 1.0], [0.55, 1.0, 1.0, 0.6])[:, None]
     return sampled * random.uniform(0.0040, 0.0072, (len(p), 1)) * ends
 
 

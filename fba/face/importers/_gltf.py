@@ -182,7 +182,7 @@ def _with_gloss(colours: Float32, material: Material) -> Float32:
     """Return the vertex colours times the material's; the fourth, opacity in glTF, is gloss here."""
     result = colours.copy()
     result[:, :3] *= np.array(material.colour, dtype=np.float32)
-    result[:, 3] = 1.0 - material.roughness
+    result[:, 3] = material.gloss
     return result
 
 

@@ -294,7 +294,7 @@ def part_colours(part: Part, plain: tuple[float, ...]) -> Float32:
     """Return float32 (V, 4): the colours of a part and its gloss; `plain` where it has none."""
     if part.colours is not None:
         return part.colours
-    row = np.array((*plain, 1.0 - part.material.roughness), dtype=np.float32)
+    row = np.array((*plain, part.material.gloss), dtype=np.float32)
     return np.tile(row, (len(part.vertices), 1))
 
 

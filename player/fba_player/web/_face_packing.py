@@ -120,7 +120,7 @@ def _pack_surface(
     material = part.material
     header: dict[str, Any] = {
         "colour": rounded(material.colour, 5),
-        "gloss": round(1 - material.roughness, 5),
+        "gloss": round(material.gloss, 5),
         "opacity": material.opacity,
         "alpha": material.alpha,
         "cutoff": material.cutoff,

@@ -87,6 +87,7 @@ void main() {
     reach.yw *= past_limbs(at, in_normal);
 #endif
     vec3 out_ = in_normal;
+    float scattered = scatter * min(in_colour.a * 40.0, 1.0); // hair of the scalp has no gloss
     float cover = 1.0;
 #ifdef HAIRS
     if (in_across.w < 0.9) {
@@ -138,9 +139,9 @@ void main() {
 #else
     vec3 albedo = in_colour.rgb;
 #endif
-    shade.rgb = in_colour.rgb * diffuse(n, albedo, reach, scatter);
+    shade.rgb = in_colour.rgb * diffuse(n, albedo, reach, scattered);
 #ifdef FINELY
-    keyed = shade.rgb - in_colour.rgb * diffuse(n, albedo, vec4(0.0, reach.yzw), scatter);
+    keyed = shade.rgb - in_colour.rgb * diffuse(n, albedo, vec4(0.0, reach.yzw), scattered);
 #endif
     vec2 left = unlost(in_colour.rgb);
     shade.a = mirrored_key(view, n, reach) * left.x;

@@ -11,6 +11,8 @@ import { MOST_VERTICES, refuse } from "./glb.js";
  */
 
 export const ADULT_EYES = 0.062; // metres between them
+/** Gloss of a material, never 0, which is that of hair painted on skin. @param {{roughness: number}} material */
+export const glossOf = (material) => Math.max(1 - material.roughness, 0.03);
 const MOST_SURFACES = 16; // that meet at one place
 const [SEAM_COSINE, SEAM_MOTION] = [0.7, 0.01];
 const [FEWEST, ROUNDNESS, FLAT] = [12, 0.03, 0.3]; // of an eyeball: vertices, error, depth by width
@@ -31,7 +33,7 @@ export function partHeader(name, kind, primitive, material, ball) {
     count: positions.length / 3,
     triangles,
     colour: [...material.colour],
-    gloss: 1 - material.roughness,
+    gloss: glossOf(material),
     colours: colours?.map((value, at) => (at % 4 < 3 ? Math.sqrt(Math.min(Math.max(value, 0), 1)) : value)), // as packed ones, roots of light
     texture: pictured ? material.texture : undefined,
     texcoords,

@@ -4,7 +4,7 @@ import { arkitNames } from "../loader/weights.js";
 import { checkedList, checkedNumber } from "./container.js";
 import { refuse } from "./glb.js";
 import { bakeLight } from "./glb_light.js";
-import { ADULT_EYES, Tracks, addSeams, commonHeader, eyeHeader, findBall, partHeader } from "./glb_parts.js";
+import { ADULT_EYES, Tracks, addSeams, commonHeader, eyeHeader, findBall, glossOf, partHeader } from "./glb_parts.js";
 import { normalise } from "./parts.js";
 
 /** @typedef {import("./glb.js").Glb} Glb */
@@ -64,7 +64,7 @@ export function shapedFace(glb) {
       for (const shape of shapes.keys()) names.add(shape);
       place(glb, node, number, primitive, facing);
       const shades = [...material.colour, 0];
-      primitive.colours = primitive.colours && primitive.colours.map((value, at) => (at % 4 < 3 ? value * shades[at % 4] : 1 - material.roughness));
+      primitive.colours = primitive.colours && primitive.colours.map((value, at) => (at % 4 < 3 ? value * shades[at % 4] : glossOf(material)));
       const kind = KINDS.find(([words]) => words.test(name))?.[1] ?? (shapes.size ? "skin" : "other");
       return { name: `${name} ${number}`, kind, primitive, material, shapes };
     });
