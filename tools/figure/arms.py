@@ -1,7 +1,8 @@
 """Arms: muscles and bones that the figure only hints at, and the picture of their skin.
 
 Both are given for the left arm as it hangs, palm to the thigh, by metres beyond the elbow and degrees around
-the bone, from the front outwards.
+the bone, from the front outwards. In the picture both halves of an arm, which meet at its front and at the
+point of the elbow, have the same texels, so that it needs no seam.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 from hair import noise
 from paint import encode_linear
 
-from fba.arrays import Bool, Float64, Int64
+from fba.arrays import Bool, Float64
 from fba.sampling import smoothstep
 
 FORMS = (
@@ -37,18 +38,22 @@ FORMS = (
 )
 CREASES = (
     # beyond the elbow, around; half its length in degrees; millimetres and depth
-    (0.003, -5, 52, 0.9, 0.20), (0.012, 2, 38, 0.8, 0.13), (-0.008, -12, 34, 0.8, 0.08),  # in the pit
-    (-0.019, 178, 36, 0.9, 0.12), (-0.011, 176, 42, 0.9, 0.14), (-0.001, 181, 40, 0.9, 0.13),  # on the elbow
-    (0.009, 178, 32, 0.9, 0.09),
-    (0.258, -90, 62, 0.8, 0.16), (0.266, -88, 70, 0.8, 0.18),  # below the palm
+    (0.003, 0, 52, 0.9, 0.20), (0.012, 0, 38, 0.8, 0.13), (-0.008, 0, 34, 0.8, 0.08),  # in the pit
+    (-0.019, 180, 36, 0.9, 0.12), (-0.011, 180, 42, 0.9, 0.14), (-0.001, 180, 40, 0.9, 0.13),  # on the elbow
+    (0.009, 180, 32, 0.9, 0.09),
+    (0.258, 90, 62, 0.8, 0.10), (0.266, 90, 70, 0.8, 0.12),  # below the palm
 )  # fmt: skip
 VEINS = (
     # points (beyond the elbow, around)
     ((-0.12, 40), (-0.03, 32), (0.05, 38), (0.14, 52), (0.24, 62)),
-    ((0.00, 20), (0.03, -20), (0.09, -58), (0.17, -66), (0.24, -75)),
-    ((0.02, 8), (0.07, -12), (0.13, -30), (0.20, -52)),
-    ((0.27, 70), (0.31, 84), (0.345, 88)), ((0.28, 112), (0.31, 100), (0.35, 110)),
-)  # fmt: skip
+    ((0.02, 12), (0.07, 14), (0.13, 30), (0.20, 42)),
+    ((0.09, 120), (0.16, 104), (0.24, 98)),
+)
+"""Of these, `FORMS` are around the whole arm; creases and veins, 0 to 180 degrees, on both halves."""
+FRONT = -2
+"""Degrees around of the front, where the halves of an arm meet."""
+GRAINS = (0.028, 0.009, 0.0035, 0.05, 0.002)
+"""Metres of blotches: three of blood, two of brown."""
 SIZE = 768
 """Texels of the picture along each side."""
 WIDE, AROUND = 0.68, 0.25
@@ -85,70 +90,61 @@ def shape_arm(p: Float64, joints: Float64, own: Bool) -> Float64:
     return outward * (0.001 * height * own)[:, None]
 
 
-def texcoords(p: Float64, triangles: Int64, joints: Float64, own: Bool) -> tuple[Int64, Int64, Float64]:
-    """Return the vertices to double (W,), triangles (F, 3) of these, and their places (W, 2) in the picture.
+def texcoords(p: Float64, joints: Float64, own: Bool) -> Float64:
+    """Return places (V, 2) in the picture.
 
     p (V, 3): skin, the arms hanging. joints (3, 3): as for `arm_place`. own (V,): that of the arms; other
     skin lies where the picture is even.
     """
-    left = p[triangles].mean(axis=1)[:, 0] > 0
-    along, turn, _ = arm_place(np.abs(p) * (1, 1, 0) + p * (0, 0, 1), joints)
-    around = turn[triangles] / 360
-    around[:, 1:] -= np.rint(around[:, 1:] - around[:, :1])
-    around -= np.rint(around.mean(axis=1, keepdims=True))
-    across = np.where(left, 0.25, 0.75)[:, None] + np.where(left, 1, -1)[:, None] * around * AROUND / WIDE
-    places = np.stack([across, (along[triangles] - FIRST) / WIDE], axis=-1)
-    places[~own[triangles].all(axis=1)] = 0.5, 0.002
-    keys = np.concatenate([triangles.reshape(-1, 1), np.rint(places.reshape(-1, 2) * SIZE * 64)], axis=1)
-    unique, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    return unique[:, 0].astype(int), number.reshape(-1, 3), np.clip(places.reshape(-1, 2)[first], 0, 1)
+    along, turn, _ = arm_place(p * np.where(p[:, :1] < 0, (-1, 1, 1), 1), joints)
+    half = np.abs((turn - FRONT + 180) % 360 - 180) / 360
+    across = np.where(p[:, 0] > 0, half * AROUND / WIDE, 1 - half * AROUND / WIDE)
+    places = np.stack([across, (along - FIRST) / WIDE], axis=1)
+    return np.where(own[:, None], np.clip(places, 0, 1), (0.5, 0.5))
+
+
+def tan(p: Float64, joints: Float64, own: Bool) -> Float64:
+    """Return (V, 3) factors of the complexion: paler inside arms, browner outside. As for `texcoords`."""
+    along, turn, _ = arm_place(p * np.where(p[:, :1] < 0, (-1, 1, 1), 1), joints)
+    sun = (0.5 + 0.5 * np.cos(np.radians(turn - 110))) * smoothstep((along + 0.16) / 0.14) * own
+    flushed = smoothstep((along - 0.23) / 0.08) * (0.3 + 0.7 * sun) * own
+    factor = 1 - 0.14 * (sun[:, None] - 0.25 * own[:, None]) * np.array((0.75, 1.0, 1.25))
+    return factor * (1 - 0.09 * flushed[:, None] * np.array((0.25, 1.0, 0.95)))
 
 
 def paint_arms() -> bytes:
-    """Return the picture: the skin of both arms, unrolled, as factors of the complexion."""
+    """Return the picture: the skin of both arms, unrolled, as factors of the complexion; even between."""
     step = (np.arange(SIZE) + 0.5) / SIZE
     across, down = np.meshgrid(step, step)
-    sides = [_paint_arm((across - 0.25) * WIDE / AROUND, down * WIDE + FIRST, 30),
-             _paint_arm((0.75 - across) * WIDE / AROUND, down * WIDE + FIRST, 60)]  # fmt: skip
-    image = np.where((across < 0.5)[..., None], *sides)
-    image[: SIZE // 100] = 1.0
+    image = np.ones((SIZE, SIZE, 3))
+    for side, seed in ((across, 30), (1 - across, 60)):
+        near = side < 0.5 * AROUND / WIDE + 0.02
+        image[near] = _paint_arm(2 * np.pi * side[near] * WIDE / AROUND, down[near] * WIDE + FIRST, seed)
     return encode_linear(WHITE * image)
 
 
-def _paint_arm(around: Float64, along: Float64, seed: int) -> Float64:
-    """Return (H, W, 3) factors at turns and metres beyond the elbow (H, W). seed: of its noise."""
-    turn = 2 * np.pi * around
-    p = np.stack([0.04 * np.cos(turn), along, 0.04 * np.sin(turn)], axis=-1).reshape(-1, 3)
-
-    def grain(scale: float, number: int) -> Float64:
-        return noise(p, scale, seed + number).reshape(along.shape)
-
-    def near(middle: float, degrees: float, length: float, wide: float) -> Float64:
-        angle = (360 * around - degrees + 180) % 360 - 180
-        return np.exp(-(((along - middle) / length) ** 2) - (angle / wide) ** 2)
-
-    blood = 0.45 * grain(0.028, 1) + 0.35 * grain(0.009, 2) + 0.25 * grain(0.0035, 3)
-    blood += 1.9 * near(-0.004, 178, 0.020, 42) + 0.7 * near(0.05, 178, 0.06, 30)
-    blood += 0.9 * smoothstep((along - 0.23) / 0.08) * (0.6 + 0.4 * np.cos(turn - 1.6))
-    sun = 0.5 + 0.5 * np.cos(turn - np.radians(120))  # outwards and back
-    sun *= smoothstep((along + 0.16) / 0.14)
-    brown = 0.9 * sun + 0.25 * grain(0.05, 4) + 0.12 * grain(0.002, 5)
-    freckles = smoothstep((grain(0.0045, 6) - 0.72) / 0.15) * sun
-    dark = np.zeros(along.shape)
-    wander = 0.0022 * grain(0.012, 7) + 0.0008 * grain(0.004, 8)
-    for middle, degrees, wide, millimetres, depth in CREASES:
-        angle = (360 * around - degrees + 180) % 360 - 180
+def _paint_arm(turn: Float64, along: Float64, seed: int) -> Float64:
+    """Return (N, 3) factors at angles (N,), radians from the front, and metres beyond the elbow (N,)."""
+    p = np.stack([0.04 * np.cos(turn), along, 0.04 * np.sin(turn)], axis=1)
+    degrees = np.degrees(turn)
+    grain = [noise(p, scale, seed + number) for number, scale in enumerate(GRAINS)]
+    blood = 0.45 * grain[0] + 0.35 * grain[1] + 0.25 * grain[2]
+    brown = 0.3 * grain[3] + 0.12 * grain[4]
+    for middle, length, wide, strength in ((-0.004, 0.020, 42, 1.9), (0.05, 0.06, 30, 0.7)):  # of the elbow
+        blood += strength * np.exp(-(((along - middle) / length) ** 2) - ((degrees - 180) / wide) ** 2)
+    freckles = smoothstep((noise(p, 0.0045, seed + 6) - 0.72) / 0.15)
+    wander = 0.0022 * noise(p, 0.012, seed + 7) + 0.0008 * noise(p, 0.004, seed + 8)
+    dark, vein = np.zeros(along.shape), np.zeros(along.shape)
+    for middle, at, wide, millimetres, depth in CREASES:
         line = np.exp(-(((along + wander - middle) / (0.001 * millimetres)) ** 2))
-        dark += depth * line * smoothstep(1 - np.abs(angle) / wide)
-    vein = np.zeros(along.shape)
+        dark += depth * line * smoothstep(1 - np.abs(degrees - at) / wide)
     for points in VEINS:
         knots = np.array(points)
-        angle = np.interp(along, knots[:, 0], knots[:, 1]) + 900 * wander
-        away = ((360 * around - angle + 180) % 360 - 180) / 360 * AROUND
+        away = (degrees - np.interp(along, knots[:, 0], knots[:, 1]) - 900 * wander) / 360 * AROUND
         ends = smoothstep((along - knots[0, 0]) / 0.02) * smoothstep((knots[-1, 0] - along) / 0.02)
         vein = np.maximum(vein, np.exp(-((away / 0.0022) ** 2)) * ends)
-    factor = 1 - 0.13 * blood[..., None] * np.array((0.25, 1.0, 0.95))
-    factor *= 1 - 0.15 * (brown[..., None] - 0.25) * np.array((0.75, 1.0, 1.25))
-    factor *= 1 - 0.16 * freckles[..., None] * np.array((0.6, 1.0, 1.2))
-    factor *= 1 - dark[..., None] * np.array((0.75, 1.0, 1.0))
-    return factor * (1 - 0.10 * vein[..., None] * np.array((1.3, 0.7, 0.4)))
+    factor = 1 - 0.13 * blood[:, None] * np.array((0.25, 1.0, 0.95))
+    factor *= 1 - 0.15 * brown[:, None] * np.array((0.75, 1.0, 1.25))
+    factor *= 1 - 0.10 * freckles[:, None] * np.array((0.6, 1.0, 1.2))
+    factor *= 1 - dark[:, None] * np.array((0.75, 1.0, 1.0))
+    return factor * (1 - 0.10 * vein[:, None] * np.array((1.3, 0.7, 0.4)))

@@ -113,12 +113,12 @@ def _pictured(piece: Piece, bones: rig.Rig) -> Piece:
     standing, _ = rig.stand(piece.vertices, piece.weights, bones)
     arm = [n for n, name in enumerate(bones.names) if name[2:].startswith(rig.ARM)]
     own = piece.weights[:, arm].sum(axis=1) > 0.5
-    rows, triangles, places = arms.texcoords(standing, piece.triangles, rig.arm_joints(bones, "l"), own)
-    colours = piece.colours[rows] / (arms.WHITE, arms.WHITE, arms.WHITE, 1.0)
-    return Piece(
-        piece.kind, piece.vertices[rows], triangles, colours, piece.weights[rows], piece.normals[rows],
-        places, arms.paint_arms(),
-    )  # fmt: skip
+    joints = rig.arm_joints(bones, "l")
+    colours = piece.colours.copy()
+    colours[:, :3] *= arms.tan(standing, joints, own) / arms.WHITE
+    return replace(
+        piece, colours=colours, texcoords=arms.texcoords(standing, joints, own), picture=arms.paint_arms()
+    )
 
 
 def _flush_factors(piece: Piece, bones: rig.Rig) -> Float64:
