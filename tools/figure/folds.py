@@ -42,9 +42,9 @@ WHITE = 0.60
 """Linear light of flat cloth in the picture; the colours of vertices are divided by it."""
 LIGHT = (0.22, 0.62, 0.75)
 """Towards the light by which folds are painted: sideways, up and outwards."""
-STEEP = 0.62
+STEEP = 0.74
 """Greatest slope of a painted fold."""
-WIDER, HIGHER = 1.5e-3, 2.1e-3
+WIDER, HIGHER = 1.5e-3, 2.7e-3
 """Metres of a millimetre in the tables of folds."""
 SHARPER = 0.6
 """Width of a fold below its crest, as a share of that above it."""
@@ -52,6 +52,14 @@ MOVED, MOST = 0.008, (-0.0016, 0.0075)
 """Metres over which folds are smoothed to move vertices, and bounds of that."""
 JITTER, STRENGTHS = 0.012, (0.45, 1.35)
 """Metres by which points of folds differ from side to side, and factors of their heights."""
+RUMPLES = ((0.080, 0.034, 3.0), (0.040, 0.017, 1.0))
+"""Creases all over the cloth: how long and how far apart they are, metres; their height, millimetres."""
+SAG = 0.7
+"""Their greatest slope across the cloth."""
+WORN = (0.02, 0.062)
+"""Where cloth is worn most, metres from its front outwards, and how far from there it is."""
+POCKET = (0.084, 0.870, 0.052, 0.064)
+"""Middle (x, y) of a pocket behind, half its width and half its height, metres."""
 STITCH = 0.0011
 """Half the width of a line of stitches or of a seam, metres."""
 
@@ -67,6 +75,9 @@ TRUNK_FOLDS: tuple[Stroke, ...] = (
     (((0.268, 0.225), (0.330, 0.240), (0.430, 0.310)), 6, 2.0),
     (((0.262, 0.240), (0.300, 0.320), (0.390, 0.430)), 7, 2.2),
     (((0.250, 0.255), (0.262, 0.340), (0.310, 0.440)), 7, 2.0),
+    (((0.130, 0.100), (0.090, 0.190), (0.030, 0.290)), 8, 1.3),
+    (((0.150, 0.150), (0.130, 0.240), (0.080, 0.350)), 8, 1.2),
+    (((0.350, 0.120), (0.390, 0.220), (0.450, 0.330)), 8, 1.4),
     # bunched at the sides of the waist and in the small of the back
     (((0.275, 0.422), (0.210, 0.448), (0.115, 0.428)), 6, 2.8),
     (((0.180, 0.472), (0.245, 0.488), (0.310, 0.468)), 6, 2.6),
@@ -85,6 +96,8 @@ SLEEVE_FOLDS: tuple[Stroke, ...] = (
     (((0.085, 0.040), (0.074, 0.105), (0.055, 0.170)), 8, 1.6),
     (((0.010, 0.175), (0.026, 0.135), (0.065, 0.105)), 6, 1.8),
     (((0.165, 0.172), (0.150, 0.130), (0.115, 0.100)), 6, 1.8),
+    (((0.100, 0.110), (0.040, 0.128), (-0.020, 0.150)), 6, 1.6),
+    (((-0.050, 0.150), (-0.085, 0.138), (-0.130, 0.155)), 6, 2.0),
 )  # fmt: skip
 LEG_FOLDS: tuple[Stroke, ...] = (
     # from the crotch towards the hip, and below the seat
@@ -105,6 +118,20 @@ LEG_FOLDS: tuple[Stroke, ...] = (
     (((0.240, 0.790), (0.160, 0.774), (0.060, 0.786)), 6, 2.2),
     (((0.190, 0.836), (0.270, 0.840), (0.350, 0.818)), 6, 2.4),
     (((-0.040, 0.742), (0.010, 0.730), (0.080, 0.748)), 6, 1.6),
+    (((-0.120, 0.772), (-0.030, 0.757), (0.090, 0.776)), 6, 2.2),
+    (((0.110, 0.858), (0.020, 0.848), (-0.090, 0.868)), 5, 2.4),
+    (((0.330, 0.860), (0.250, 0.862), (0.170, 0.870)), 5, 2.2),
+    # across the front of the hip
+    (((-0.090, 0.098), (0.000, 0.084), (0.090, 0.050)), 5, 1.3),
+    (((-0.080, 0.205), (0.010, 0.196), (0.110, 0.150)), 6, 1.2),
+    # along the thigh, over the knee, down the shin
+    (((0.150, 0.190), (0.130, 0.300), (0.070, 0.410)), 9, 1.2),
+    (((0.000, 0.220), (-0.010, 0.300), (-0.050, 0.390)), 9, 1.0),
+    (((-0.090, 0.432), (-0.020, 0.456), (0.060, 0.440)), 7, 1.3),
+    (((0.090, 0.508), (0.020, 0.522), (-0.070, 0.500)), 7, 1.3),
+    (((-0.080, 0.560), (-0.020, 0.630), (0.050, 0.690)), 8, 1.3),
+    (((0.160, 0.600), (0.100, 0.665), (0.020, 0.715)), 8, 1.4),
+    (((0.260, 0.580), (0.210, 0.650), (0.120, 0.710)), 8, 1.6),
 )  # fmt: skip
 
 
@@ -114,7 +141,7 @@ class Tube:
 
     place: of its middle above, in texels of the picture. side: 1 left or in the middle, -1 mirrored. bow:
     metres by which its middle is before the line between both ends. higher: factor of the heights of its
-    folds. whole: that they lie on both sides.
+    folds. whole: that they lie on both sides. worn: how much paler it is in front.
     """
 
     start: Float64
@@ -127,6 +154,7 @@ class Tube:
     bow: float = 0.0
     higher: float = 1.0
     whole: bool = False
+    worn: float = 0.0
 
     @property
     def turn(self) -> float:
@@ -175,6 +203,10 @@ class Tube:
                         WIDER * width,
                         strength * self.higher * HIGHER * height,
                     )
+        if random is not None:
+            for wide, narrow, height in RUMPLES:
+                creases = _rumpled(along.shape, wide, narrow, random)
+                raised += 0.001 * height * creases * smoothstep((along - 0.03) / 0.15)
         return raised
 
     def _grid(self) -> tuple[Float64, Float64]:
@@ -185,6 +217,28 @@ class Tube:
         """Return (N,) a field of `heights` at places (N, 2) on the tube."""
         row, column = (flat[:, 1] + PAD) * DENSITY, (flat[:, 0] + self.turn / 2 + PAD) * DENSITY
         return map_coordinates(field, [row, column], order=1, mode="nearest")
+
+
+def _rumpled(shape: tuple[int, ...], wide: float, narrow: float, random: np.random.Generator) -> Float64:
+    """Return (H, W) creases, 0..1, that fade: ridges where smooth noise is 0.
+
+    They sag in front and behind, and go on around the tube.
+    """
+    rows, columns = np.indices(shape).astype(np.float64)
+    turn = round(shape[1] - 2 * PAD * DENSITY)
+    rows -= SAG * turn / (4 * np.pi) * np.cos(4 * np.pi * (columns - shape[1] / 2) / turn)
+    noise, patches = (
+        map_coordinates(
+            gaussian_filter(
+                random.standard_normal((shape[0], turn)), np.array(sizes) * DENSITY / 2, mode="wrap"
+            ),
+            [rows, columns],
+            order=1,
+            mode="grid-wrap",
+        )
+        for sizes in ((narrow, wide), (wide, wide))
+    )
+    return np.exp(-((noise / (0.6 * noise.std())) ** 2)) * smoothstep(patches / patches.std() + 0.2)
 
 
 def _raise(
@@ -217,9 +271,9 @@ def trunk_and_sleeves() -> tuple[Tube, ...]:
     """Return the tubes of the shirt: the trunk, the left and the right sleeve."""
     above = np.array([0, 1.53, -0.035])
     return (
-        Tube(above, above - (0, 0.63, 0), 0.15, 0.62, TRUNK_FOLDS, (512, 40), whole=True),
-        Tube(SHOULDER, ELBOW, 0.056, 0.20, SLEEVE_FOLDS, (230, 740)),
-        Tube(SHOULDER, ELBOW, 0.056, 0.20, SLEEVE_FOLDS, (794, 740), -1.0),
+        Tube(above, above - (0, 0.63, 0), 0.15, 0.62, TRUNK_FOLDS, (512, 40), higher=1.25, whole=True),
+        Tube(SHOULDER, ELBOW, 0.056, 0.20, SLEEVE_FOLDS, (230, 740), higher=1.3),
+        Tube(SHOULDER, ELBOW, 0.056, 0.20, SLEEVE_FOLDS, (794, 740), -1.0, higher=1.3),
     )  # fmt: skip
 
 
@@ -227,8 +281,8 @@ def legs() -> tuple[Tube, ...]:
     """Return the tubes of the trousers: the left and the right leg."""
     hip, ankle = np.array([0.072, 0.99, -0.045]), np.array([0.155, 0.08, -0.100])
     return (
-        Tube(hip, ankle, 0.080, 0.93, LEG_FOLDS, (256, 45), bow=0.055, higher=1.3),
-        Tube(hip, ankle, 0.080, 0.93, LEG_FOLDS, (768, 45), -1.0, 0.055, 1.3),
+        Tube(hip, ankle, 0.080, 0.93, LEG_FOLDS, (256, 45), 1.0, 0.055, 1.3, worn=0.55),
+        Tube(hip, ankle, 0.080, 0.93, LEG_FOLDS, (768, 45), -1.0, 0.055, 1.3, worn=0.55),
     )
 
 
@@ -259,6 +313,14 @@ def _shirt_seams(p: Float64, tube: int) -> Float64:
     return np.min(lines, axis=0)
 
 
+def _from_pocket(p: Float64) -> Float64:
+    """Return (N,) metres from points (N, 3) to the outline of a pocket behind, which ends in a point."""
+    x, y, wide, high = POCKET
+    across = np.abs(np.abs(p[:, 0]) - x)
+    down = np.maximum(p[:, 1] - y, y - p[:, 1] + 0.15 * across - 0.006)
+    return np.where(p[:, 2] < -0.03, np.abs(np.maximum(across - wide, down - high)), 1.0)
+
+
 def _beyond_armhole(p: Float64) -> Float64:
     """Return (N,) metres from the armhole outwards; far where points (N, 3) are below or above its seam."""
     return np.where((p[:, 1] > 1.29) & (p[:, 1] < 1.405), np.abs(p[:, 0]) - ARMHOLE, 1.0)
@@ -271,7 +333,7 @@ def _trouser_seams(p: Float64, tube: int) -> Float64:
     inner = np.where(along > 0.16, np.abs(around + legs()[tube].turn / 4), 1.0)
     pocket = np.where((along < 0.16) & (along > 0.01), np.abs(around - 0.055 - 0.42 * along), 1.0)
     fly = np.where((p[:, 2] > 0) & (along < 0.15), np.abs(p[:, 0]), 1.0)
-    return np.min([sides, inner, pocket, fly, np.abs(height_above_hem(p) - 0.022)], axis=0)
+    return np.min([sides, inner, pocket, fly, _from_pocket(p), np.abs(height_above_hem(p) - 0.022)], axis=0)
 
 
 def fold(
@@ -344,6 +406,10 @@ def _paint(
         hollow = np.clip((raised - gaussian_filter(raised, 0.012 * DENSITY)) / 0.0015, -1, 1)
         shade = tube.sample(np.clip(shown, 0.35, 1.5) * (1 + 0.10 * hollow), flat)
         shade *= 1 + 0.035 * noise(p, 0.035, 3) + 0.025 * noise(p, 0.006, 4)
+        front = np.exp(-(((flat[:, 0] - WORN[0]) / WORN[1]) ** 2)) - 0.4
+        shade *= 1 + tube.worn * front * smoothstep((flat[:, 1] - 0.06) / 0.2) * smoothstep(
+            (0.68 - flat[:, 1]) / 0.25
+        )
         away = edges(p, number)
         shade *= 1 - 0.38 * np.exp(-((away / STITCH) ** 2)) + 0.10 * np.exp(-(((away - 0.004) / 0.002) ** 2))
         image[chart.known] = WHITE * shade

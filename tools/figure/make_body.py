@@ -12,6 +12,7 @@ import io
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import arms
 import clothes
 import folds
 import numpy as np
@@ -103,17 +104,30 @@ def make_pieces() -> tuple[dict[str, Piece], rig.Rig]:
     pieces["skin"].colours[:, :3] *= _flush_factors(pieces["skin"], bones)
     _paint_nails(pieces["skin"], bones)
     _shade([piece for piece in pieces.values() if piece.kind != "neck"])
+    pieces["skin"] = _pictured(pieces["skin"], bones)
     return pieces, bones
 
 
+def _pictured(piece: Piece, bones: rig.Rig) -> Piece:
+    """Return the skin with the picture of the arms."""
+    standing, _ = rig.stand(piece.vertices, piece.weights, bones)
+    arm = [n for n, name in enumerate(bones.names) if name[2:].startswith(rig.ARM)]
+    own = piece.weights[:, arm].sum(axis=1) > 0.5
+    joints = rig.arm_joints(bones, "l")
+    colours = piece.colours.copy()
+    colours[:, :3] *= arms.tan(standing, joints, own) / arms.WHITE
+    return replace(
+        piece, colours=colours, texcoords=arms.texcoords(standing, joints, own), picture=arms.paint_arms()
+    )
+
+
 def _flush_factors(piece: Piece, bones: rig.Rig) -> Float64:
-    """Return (V, 3) factors of the complexion: redder at fingertips, knuckles and elbows."""
+    """Return (V, 3) factors of the complexion: redder at fingertips and knuckles."""
     middles = bones.bind[:, :3, 3]
     tips = [n for n, name in enumerate(bones.names) if name[-1] == "3"]
     bends = [n for n, name in enumerate(bones.names) if name[-1] in "12" and name[2:-1] in FINGERS]
-    elbows = [n for n, name in enumerate(bones.names) if name.endswith("elbow")]
     share = np.zeros(len(piece.vertices))
-    for joints, strength, reach in ((tips, 0.8, 0.014), (bends, 0.55, 0.010), (elbows, 0.5, 0.035)):
+    for joints, strength, reach in ((tips, 0.9, 0.014), (bends, 0.9, 0.012)):
         away = np.linalg.norm(piece.vertices[:, None] - middles[joints], axis=2).min(axis=1)
         share = np.maximum(share, strength * np.exp(-((away / reach) ** 2)))
     return 1 - share[:, None] * (0.03, 0.20, 0.22)

@@ -10,6 +10,7 @@ import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import arms
 import bending
 import numpy as np
 from person import Person, make_person, reproportion
@@ -45,6 +46,8 @@ STRAIGHT = (0.13, 0.80)
 """Heights between which the outline of a leg is evened out, metres."""
 EVEN, ROUND = 0.13, 0.16
 """Metres along the leg over which it is, and the length as which a radian around it counts."""
+KNUCKLE = (0.010, 0.008, 0.0028)
+"""Metres of a knuckle off the joint, to its edge, and by which it stands out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,20 +154,30 @@ def _share_forward(
     weights[:, a] *= 1 - ahead
 
 
+def stand(vertices: Float64, weights: Float64, bones: Rig) -> tuple[Float64, Float64]:
+    """Return points (V, 3) of the figure in the default posture, and the rotations (V, 3, 3) to there."""
+    upright = np.tile(np.eye(4), (len(bones.names), 1, 1))
+    upright[:, :3, 3] = bones.centres
+    standing = upright @ np.linalg.inv(bones.bind)
+    turned = np.einsum("vj,jab->vab", weights, standing)
+    points = np.pad(vertices, ((0, 0), (0, 1)), constant_values=1.0)
+    return np.einsum("vab,vb->va", turned, points)[:, :3], turned[:, :3, :3]
+
+
+def arm_joints(bones: Rig, side: str) -> Float64:
+    """Return (3, 3), where shoulder, elbow and wrist are in the default posture."""
+    return bones.centres[[bones.names.index(f"{side}_{name}") for name in ("shoulder", "elbow", "wrist")]]
+
+
 def shape_for_standing(person: Person, bones: Rig) -> Person:
     """Return the person reshaped where clothes lie on it, for hanging arms and straight legs.
 
     With the arms down, the cap of the figure's shoulder would stick out as a corner beside the joint; a
     person's slopes from the neck into the arm. Cloth falls from the thigh past the hollows of knee and shin.
-    Both are made in the default posture, and transformed back into that of the figure.
+    Arms get muscles and bones. All is made in the default posture, and transformed back into that of the
+    figure.
     """
-    upright = np.tile(np.eye(4), (len(bones.names), 1, 1))
-    upright[:, :3, 3] = bones.centres
-    standing = upright @ np.linalg.inv(bones.bind)  # from the posture of the figure to the default one
-    turned = np.einsum("vj,jab->vab", bones.weights, standing)
-    positions = np.einsum(
-        "vab,vb->va", turned, np.pad(person.vertices, ((0, 0), (0, 1)), constant_values=1.0)
-    )[:, :3]
+    positions, turned = stand(person.vertices, bones.weights, bones)
     shift = np.zeros_like(positions)
     for side, sign in (("l", 1.0), ("r", -1.0)):
         joint = bones.centres[bones.names.index(f"{side}_shoulder")]
@@ -174,7 +187,14 @@ def shape_for_standing(person: Person, bones: Rig) -> Person:
         knee = bones.centres[bones.names.index(f"{side}_knee")]
         mine = (sign * positions[:, 0] > 0) & (person.arms < 0.5) & (positions[:, 1] < STRAIGHT[1])
         shift[mine] += _straighten(positions[mine] - (knee[0], 0.0, knee[2]))
-    back = np.einsum("vab,va->vb", turned[:, :3, :3], shift)  # by the inverse rotations
+        mirror = np.array([sign, 1.0, 1.0])
+        own = (person.arms > 0.5) & (sign * positions[:, 0] > 0)
+        shift += mirror * arms.shape_arm(positions * mirror, arm_joints(bones, side) * mirror, own)
+        for finger in FINGERS:
+            knuckle = bones.centres[bones.names.index(f"{side}_{finger}1")] + (sign * KNUCKLE[0], 0.0, 0.0)
+            near = np.exp(-(((positions - knuckle) / KNUCKLE[1]) ** 2).sum(axis=1))
+            shift[:, 0] += sign * KNUCKLE[2] * near
+    back = np.einsum("vab,va->vb", turned, shift)  # by the inverse rotations
     return replace(person, vertices=person.vertices + back)
 
 

@@ -29,8 +29,10 @@ THORAX = tuple(f"vt{n}" for n in range(12, 0, -1))
 NECK = tuple(f"vc{n}" for n in range(7, 0, -1))
 HEAD = ("skullbase",)
 FINGERS = ("index", "middle", "ring", "pinky")
-_MORE_CURL = {"index": 0.75, "middle": 0.95, "ring": 1.1, "pinky": 1.2}
+_MORE_CURL = {"index": 0.85, "middle": 0.95, "ring": 1.1, "pinky": 1.2}
 """Factors of the curl of each finger: a hand at rest closes towards the little finger."""
+_JOINT_CURL = {1: 0.75, 2: 1.4, 3: 0.85}
+"""Factors of the curl of the joints along a finger: the middle one bends most."""
 _LATE = 0.02
 """Fraction of the cycle by which arms lag behind the legs."""
 _REACH = 0.995
@@ -200,13 +202,12 @@ def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64
         if girdle in skeleton:
             writer.turn(girdle, 2, sign * np.radians(arms.up) * constant)
             writer.turn(girdle, 1, -sign * np.radians(arms.forward) * constant)
-        for finger in FINGERS:
-            for number in (1, 2, 3):
-                joint = f"{letter}_{finger}{number}"
-                if joint in skeleton:
+        curl = np.radians(arms.curl) * constant
+        for number in (1, 2, 3):
+            for finger in FINGERS:
+                if (joint := f"{letter}_{finger}{number}") in skeleton:
                     # fingers flex about z: they curl inward, towards the thigh
-                    curl = np.radians(arms.curl * _MORE_CURL[finger])
-                    writer.turn(joint, 2, -sign * curl * constant)
+                    writer.turn(joint, 2, -sign * curl * _MORE_CURL[finger] * _JOINT_CURL[number])
 
 
 def _palm_goals(side: Side, character: Character, size: float) -> Float64:
