@@ -122,7 +122,7 @@ def _grown_chart(chart: Chart, looks: Looks) -> tuple[Float64, Float64]:
     near = np.linalg.norm(step, axis=1, keepdims=True) < MAX_STEP
     grown = grown[chart.known]
     if not looks.hair.curly:  # neither strands nor their parting run straight
-        grown = grown + np.stack([0.005 * noise(grown, 0.032, 51 + k) for k in range(3)], axis=1)
+        grown = grown + np.stack([0.004 * noise(grown, 0.045, 51 + k) for k in range(3)], axis=1)
     return grown, np.where(near, step, 0.0)
 
 

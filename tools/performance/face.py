@@ -74,8 +74,8 @@ def _mouth() -> dict[str, Float]:
     bottom = say["bottom"] + 150 * grin - 60 * press
     middle = {"top": top, "bottom": bottom}
     half = {"top": 0.88 * top + 130 * spread, "bottom": 0.86 * bottom - 150 * spread}
-    width = say["width"] + 110 * spread
-    corner = 430 * spread - 0.5 * say["jaw"] * rounded
+    width = say["width"] + 80 * spread
+    corner = 400 * spread - 0.5 * say["jaw"] * rounded
     jaw = say["jaw"] + 60 * grin
     curves = {
         "open_jaw": np.maximum(jaw, 0),

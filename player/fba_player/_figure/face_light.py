@@ -44,6 +44,8 @@ ENCLOSED = 0.04
 INSIDE_KEY, INSIDE_SKY, TONGUE_SKY = 0.44, 0.46, 0.08
 """Shares of key light and sky that reach the inside of an open mouth by reflection; a tongue, lit by red
 walls, mirrors little of the sky."""
+THROAT, DARKEST = 0.9, 0.2
+"""Distance behind the lips, in ES0, at which the least share of that light is left, and that share."""
 CONSTANT_HARMONIC = 0.282095
 """The first spherical harmonic, equal in all directions."""
 TURN_DECIMALS = 2
@@ -230,7 +232,10 @@ class FaceLight:
         sky = np.where(inside, INSIDE_SKY, 0.0)
         for rows in self._tongues:
             sky[rows] = TONGUE_SKY
-        wide = _lit_inside(cached_visibility(moved, normals, triangles, near), sky)
+        behind = still[self._lips, 2].max() - still[:, 2]
+        depth = behind / (THROAT * self._model.fapu.ES * 1024)
+        share = np.clip(1 - (1 - DARKEST) * depth, DARKEST, 1.0)
+        wide = _lit_inside(cached_visibility(moved, normals, triangles, near), sky, share)
         arrays = [
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
             for before, after in zip(shut, wide, strict=True)
@@ -283,14 +288,15 @@ def _largest_piece(triangles: Int32, chosen: Bool, near: Bool) -> Bool:
     return chosen & (piece == most.argmax()) if most.any() else np.zeros_like(chosen)
 
 
-def _lit_inside(wide: Visibility, sky: Float64) -> Visibility:
+def _lit_inside(wide: Visibility, sky: Float64, share: Float64) -> Visibility:
     """Return visibility with the light that walls of the mouth cast on each other.
 
-    sky: (V,), share of it that they reflect; 0 outside the mouth.
+    sky: (V,), share of it that they reflect; 0 outside the mouth. share: (V,), how much of their light there
+    is at that depth.
     """
     light = wide.light.copy()
-    light[sky > 0, 0] += INSIDE_KEY / CONSTANT_HARMONIC
-    return wide._replace(light=light, open=(wide.open + sky * (1 - wide.open)).astype(np.float32))
+    light[:, 0] += np.where(sky > 0, share * INSIDE_KEY / CONSTANT_HARMONIC, 0.0)
+    return wide._replace(light=light, open=(wide.open + share * sky * (1 - wide.open)).astype(np.float32))
 
 
 def cached_visibility(positions: Float32, normals: Float32, triangles: Int32, within: Bool) -> Visibility:
