@@ -14,9 +14,9 @@ SEGMENTS = 2
 GLOSS = 0.1
 GROUPS = (
     # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
-    ("front", 140, (0.003, 0.022), (0.014, 0.034), 0.00070, 0.0050),
-    ("crown", 90, (0.026, 1.0), (0.016, 0.030), 0.00110, 0.0040),
-    ("stray", 110, (0.030, 1.0), (0.020, 0.045), 0.00040, 0.0070),
+    ("front", 100, (0.003, 0.022), (0.014, 0.034), 0.00070, 0.0050),
+    ("crown", 30, (0.026, 1.0), (0.016, 0.030), 0.00110, 0.0040),
+    ("stray", 45, (0.030, 1.0), (0.020, 0.045), 0.00040, 0.0070),
 )
 NEIGHBOURS = 8
 """Vertices between which the depth of the layer is interpolated."""
