@@ -13,13 +13,13 @@ __all__ = ["OPEN_MOUTH", "open_mouth"]
 
 OPEN_MOUTH = MappingProxyType(
     {
-        "open_jaw": 580,
+        "open_jaw": 740,
         "lower_t_midlip": -90,
         "raise_b_midlip": -740,
         "lower_t_lip_lm": -90,
         "lower_t_lip_rm": -90,
-        "raise_b_lip_lm": -650,
-        "raise_b_lip_rm": -650,
+        "raise_b_lip_lm": -630,
+        "raise_b_lip_rm": -630,
         "raise_l_cornerlip": -260,
         "raise_r_cornerlip": -260,
         "stretch_l_cornerlip": -80,
@@ -28,8 +28,8 @@ OPEN_MOUTH = MappingProxyType(
         "raise_b_midlip_o": -740,
         "lower_t_lip_lm_o": -90,
         "lower_t_lip_rm_o": -90,
-        "raise_b_lip_lm_o": -650,
-        "raise_b_lip_rm_o": -650,
+        "raise_b_lip_lm_o": -630,
+        "raise_b_lip_rm_o": -630,
         "raise_l_cornerlip_o": -260,
         "raise_r_cornerlip_o": -260,
         "stretch_l_cornerlip_o": -80,

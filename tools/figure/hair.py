@@ -268,7 +268,7 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
     long = smoothstep((unit(places - MIDDLE)[:, 1] - 0.1) / 0.7)
     full = smoothstep(height / THINNING)
     normal, uniform = random.normal, random.uniform
-    tone = normal(0, 0.24, count) + 0.2 * noise(places, 0.016, 63)
+    tone = normal(0, 0.17, count) + 0.14 * noise(places, 0.016, 63)
     if hair.curly:
         length, width = uniform(0.013, 0.023, count) * (0.4 + 0.6 * full), uniform(0.0019, 0.0033, count)
         heading = uniform(-np.pi, np.pi, count)
@@ -278,7 +278,7 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
         length = (0.005 + full * (0.011 + 0.022 * long)) * uniform(0.7, 1.2, count)
         length /= 1 + 0.5 * _cropped(places)
         width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
-        heading, bend = normal(0, 0.1, count), normal(0, 0.16, count) + 0.35 * noise(places, 0.020, 62)
+        heading, bend = normal(0, 0.07, count), normal(0, 0.10, count) + 0.25 * noise(places, 0.020, 62)
         tone += 0.3 * (1 - full)
         order = -roots.real * (1 + 0.06 * normal(size=count))
     order = np.argsort(order)
