@@ -46,7 +46,10 @@ def _parse_show(text: str) -> tuple[str, Any]:
 def _parse_camera(text: str) -> Any:
     from fba.player import Camera
 
-    return text if text in Camera.presets else Camera.parse(text)
+    if text in Camera.presets:
+        return text
+    camera = Camera.parse(text)
+    return camera if "distance=" in text or "at=" in text else text  # else it fits what is shown
 
 
 CAMERA = options.TextType("camera", _parse_camera)
@@ -90,8 +93,8 @@ class SceneOptions(Reading):
         type=CAMERA,
         metavar="VIEW",
         help="Of the face: front, three-quarter, profile or face; of the whole figure: body, side, back or "
-        "top; or turn=35,tilt=5,distance=1.2,at=0:1.6:0,angle=24 in degrees and metres. Default: one that "
-        "suits the content.",
+        "top; or turn=35,tilt=5,distance=1.2,at=0:1.6:0,angle=24 in degrees and metres (without distance and "
+        "at, the figure fits). Default: one that suits the content.",
     )
     follow: Literal["hips", "head", "none"] | None = option(
         help="What the camera follows. Default: the head in views of the face, else a figure that walks away."

@@ -22,7 +22,7 @@ from fba_player.scene._display_options import HAIRS
 from fba_player.scene._fap_heatmap import GLOSS, heat_colours, heat_legend, plain_colours
 from fba_player.scene._layout import Drawing, join_views, make_captions, move_view
 from fba_player.scene.scene import Scene
-from fba_player.view._camera import FACE_PRESETS, PRESETS, Camera, Subject
+from fba_player.view._camera import FACE_PRESETS, Camera, Subject
 from fba_player.view._geometry import transform, turn_partly
 from fba_player.view._view import Extras, FaceMesh, FaceShape, Seen, View, Wipe
 from fba_player.view.protocols import Timed
@@ -171,8 +171,6 @@ class CompareScene(Timed[CompareTimeline]):
 
         preset: see `Scene.camera`.
         """
-        if preset is not None and preset not in PRESETS:
-            raise ValueError(f"no camera preset {preset!r}; there are {', '.join(PRESETS)}")
         camera = self.scenes[0].camera(preset, aspect)
         if self._in_a_row and len(self.scenes) > 1:
             camera = replace(camera, field_of_view=FIELD_OF_VIEW)

@@ -182,7 +182,8 @@ class Scene(Timed[Timeline]):
         """Return a camera that has everything in view, for the named preset or for what the content suggests.
 
         "body", "side", "back" and "top" fit the whole body; "front", "three-quarter", "profile" and "face"
-        look at the face, also where there is a body. ValueError for another name.
+        look at the face, also where there is a body; "turn=35,tilt=5" is any other view of the whole figure.
+        ValueError for another name.
         """
         if preset is None:
             return default_camera(self, aspect)

@@ -58,10 +58,12 @@ class Camera:
 
     @classmethod
     def preset(cls, name: str, subject: Subject, aspect: float = 16 / 9) -> Camera:
-        """Return a named view, see `PRESETS`, that fits the subject.
+        """Return a view that fits the subject: a named one, see `PRESETS`, or a text of `parse`.
 
         aspect: width / height of the picture. Raises ValueError on another name.
         """
+        if "=" in name:
+            return cls.parse(name).fit(subject, aspect)
         if name not in PRESETS:
             raise ValueError(f"no camera preset {name!r}; there are {', '.join(PRESETS)}")
         yaw, pitch = PRESETS[name]

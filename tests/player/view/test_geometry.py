@@ -18,7 +18,7 @@ from fba_player._figure.face import find_eyeball
 from fba_player._mesh.primitives import sphere_mesh
 from fba_player.gl._antialias_region import bounding_rectangles
 from fba_player.gl._silhouette import TILE, Outliner
-from fba_player.view._camera import Camera
+from fba_player.view._camera import Camera, Subject
 from fba_player.view._geometry import rotation_vector, turn_partly
 from fba_player.view._view import FaceMesh, FaceShape, Mesh, MeshShape, View
 
@@ -167,6 +167,14 @@ def test_a_camera_is_read_back_from_its_text() -> None:
     camera = Camera(target=(0.25, 1.6, -0.5), yaw=-35.0, pitch=5.0, distance=1.25, field_of_view=30.0)
     assert Camera.parse(camera.text) == camera
     assert Camera.parse("tilt=10") == Camera(pitch=10.0)
+
+
+def test_directions_alone_fit_the_subject_as_named_views_do() -> None:
+    subject = Subject((0.1, 1.0, 0.0), half_height=0.9, half_width=0.4)
+    assert Camera.preset("turn=25,tilt=8", subject) == Camera.preset("body", subject)
+    wide = Camera.preset("turn=25,tilt=8,angle=50", subject)
+    assert wide.target == subject.centre
+    assert wide.distance < Camera.preset("body", subject).distance
 
 
 @pytest.mark.parametrize(
