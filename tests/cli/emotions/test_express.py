@@ -83,7 +83,7 @@ def test_the_rules_have_parameters(run: Run) -> None:
     weak = json.loads(run("express", "fear=90 joy=60", "--reduction", "0", "--json").out)["faps"]
     strong = json.loads(run("express", "fear=90 joy=60", "--reduction", "1", "--json").out)["faps"]
     assert "lift_l_cheek" not in weak
-    assert strong["lift_l_cheek"] == 180
+    assert strong["lift_l_cheek"] == 228
 
 
 @pytest.mark.parametrize(
