@@ -227,7 +227,7 @@ def paint_locks(p: Float64, step: Float64, above: Float64, hair: Hair) -> tuple[
     tone = (drawn + gaps * deep) / np.maximum(cover, 0.02)
     if not hair.curly:
         bright = shine(unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69))
-        tone = tone * (1 + 0.3 * bright) + 0.40 * bright
+        tone = tone * (1 + 0.2 * bright) + 0.32 * bright
     return tone, np.where(above < -0.5, 0.0, cover * thin)
 
 

@@ -23,11 +23,11 @@ STRAIGHT = 100.0
 """Value up to which a stretched corner goes straight to the side; then it meets the teeth."""
 BEND = 0.62
 """From there on, its way back as a share of its way to the side."""
-BULGE = (0.72, 0.42)
+BULGE = (0.62, 0.40)
 """How far the cheek comes out, and up, as shares of the way of a raised corner."""
 FOLD = -0.20
 """The same of the fold beside it."""
-CHEEK, CHEEK_BREADTH = {"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.265
+CHEEK, CHEEK_BREADTH = {"5.3": 0.55, "9.1": 0.35, "8.3": 0.10}, 0.32
 """Where the bulge is: shares of feature points of the left side, and its breadth in ES0."""
 FOLD_ENDS, FOLD_BREADTH = ({"8.3": 0.15, "9.1": 0.85}, {"8.3": 0.65, "9.1": 0.35}), 0.12
 """The same of the ends of the fold."""
