@@ -132,6 +132,9 @@ def _outcomes(future: Any, client: Any) -> list[Outcome[Any, Any]] | str | None:
             return None
         except (OSError, TimeoutError):  # the worker that had it has ended, and another does it again
             time.sleep(POLL_SECONDS)
+        except Exception:  # the worker that had it has ended, and doing it again has failed
+            if future.status != "error":
+                raise
         else:
             return outcomes
     return None

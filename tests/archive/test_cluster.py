@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -115,6 +116,28 @@ def test_workers_that_end_lose_nothing(tmp_path: Path) -> None:
     assert {one.item[1]: one.value for one in outcomes if not one.error} == {
         number: number * number for number in range(40) if number != 9
     }
+
+
+def test_workers_that_end_before_outcomes_are_fetched() -> None:
+    """The chunk is done once more, and that fails while its outcomes are awaited."""
+
+    class KilledWorker(Exception):
+        pass
+
+    class Late:
+        status = "finished"
+
+        def result(self, timeout: float) -> list[object]:
+            self.status = "error"
+            raise KilledWorker
+
+        def exception(self, timeout: float) -> Exception:
+            return KilledWorker()
+
+    client = SimpleNamespace(status="running")
+    assert (
+        cluster._outcomes(Late(), client) == "the workers that worked on it were ended; is their memory full?"
+    )
 
 
 def test_a_scheduler_that_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

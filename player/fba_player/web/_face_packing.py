@@ -27,7 +27,7 @@ from fba_player.view._view import FaceShape
 from fba_player.web._container import Container, rounded
 from fba_player.web._look_packing import pack_face_light, pack_wrinkles
 
-STEP = 1e-5
+STEP = 1.5e-5
 """Metres: positions are multiples of it."""
 SHAPE_STEP = 1.85e-5
 """Metres: shapes are multiples of it."""
