@@ -121,18 +121,19 @@ def test_workers_that_end_lose_nothing(tmp_path: Path) -> None:
 def test_workers_that_end_before_outcomes_are_fetched() -> None:
     """The chunk is done once more, and that fails while its outcomes are awaited."""
 
-    class KilledWorker(Exception):
-        pass
+    from distributed.scheduler import KilledWorker
+
+    ended = KilledWorker("a chunk", None, 1)
 
     class Late:
         status = "finished"
 
         def result(self, timeout: float) -> list[object]:
             self.status = "error"
-            raise KilledWorker
+            raise ended
 
         def exception(self, timeout: float) -> Exception:
-            return KilledWorker()
+            return ended
 
     client = SimpleNamespace(status="running")
     assert (
