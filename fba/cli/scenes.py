@@ -49,7 +49,7 @@ def _parse_camera(text: str) -> Any:
     if text in Camera.presets:
         return text
     camera = Camera.parse(text)
-    return camera if "distance=" in text or "at=" in text else text  # else it fits what is shown
+    return camera if Camera.has_place(text) else text  # which fits what is shown
 
 
 CAMERA = options.TextType("camera", _parse_camera)

@@ -58,11 +58,14 @@ class Camera:
 
     @classmethod
     def preset(cls, name: str, subject: Subject, aspect: float = 16 / 9) -> Camera:
-        """Return a view that fits the subject: a named one, see `PRESETS`, or a text of `parse`.
+        """Return a view that fits the subject, by a name of `PRESETS`, or directions as `parse` reads them.
 
-        aspect: width / height of the picture. Raises ValueError on another name.
+        aspect: width / height of the picture. Raises ValueError on another name, and where a text gives a
+        place of its own, which would be lost.
         """
         if "=" in name:
+            if cls.has_place(name):
+                raise ValueError(f"{name!r} gives a place: Camera.parse returns its camera")
             return cls.parse(name).fit(subject, aspect)
         if name not in PRESETS:
             raise ValueError(f"no camera preset {name!r}; there are {', '.join(PRESETS)}")
@@ -108,6 +111,11 @@ class Camera:
             if not low <= number <= high:
                 raise ValueError(f"{name}={number:g} of the camera lies outside of {low:g} to {high:g}")
         return camera
+
+    @staticmethod
+    def has_place(text: str) -> bool:
+        """Return whether a text of `parse` says where the camera is, and not only how it looks."""
+        return "distance=" in text or "at=" in text
 
     @property
     def text(self) -> str:

@@ -175,6 +175,8 @@ def test_directions_alone_fit_the_subject_as_named_views_do() -> None:
     wide = Camera.preset("turn=25,tilt=8,angle=50", subject)
     assert wide.target == subject.centre
     assert wide.distance < Camera.preset("body", subject).distance
+    with pytest.raises(ValueError, match="gives a place"):
+        Camera.preset("turn=25,distance=2", subject)
 
 
 @pytest.mark.parametrize(
