@@ -20,8 +20,6 @@ RINGS = 3
 """Vertices up to this many edges away from folded triangles may be eased."""
 STAGES = (0.4, 0.7, 1.0)
 """Shares of a goal in the order in which they are tried: early folds are the worst."""
-LEAST_RETAINED = 0.88
-"""Least share of what one goal reached that easing towards another must leave."""
 DENSE_MAX = 150
 """Systems of at most this many vertices are solved faster as dense ones."""
 ROUNDS = 2
@@ -137,7 +135,10 @@ def unfold(surface: Surface, limiter: Limiter, motion: Motion, pinned: Bool, tur
 def ease_field(
     surface: Surface, limiter: Limiter, field: Float64, goals: Sequence[float], pinned: Bool
 ) -> Float64:
-    """Return a linear motion (N, 3) per unit of value, eased to reach the goals without folds if possible."""
+    """Return a linear motion (N, 3) per unit of value, eased to reach the goals without folds if possible.
+
+    What helps one goal can harm the other: that which is reached least counts first.
+    """
     result = field
     reached = _reachable_shares(limiter, field, goals)
     for share in STAGES:
@@ -150,9 +151,7 @@ def ease_field(
             unfolded = unfold(surface, limiter, motion, pinned, False)
             trial = limiter.spread(unfolded.vertices, unfolded.shifts[1] / (goal * share))
             now = _reachable_shares(limiter, trial, goals)
-            if now[k] > reached[k] and all(
-                new >= LEAST_RETAINED * old for new, old in zip(now, reached, strict=True)
-            ):
+            if sorted(now) > sorted(reached):
                 result, reached = trial, now
     return result
 
