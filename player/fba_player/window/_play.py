@@ -27,7 +27,7 @@ from fba_player.session._source import Source
 from fba_player.sound._peaks import Peaks
 from fba_player.view._camera import Camera
 from fba_player.window._window import WARNING_SECONDS, Window
-from fba_player.window.surface import Resumed, Surface
+from fba_player.window.surface import ClosedByUser, Resumed, Surface
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
@@ -92,6 +92,7 @@ def play(
             surface = stack.enter_context(Surface(size))
         else:
             surface.memory = Memory()
+        stack.enter_context(contextlib.suppress(ClosedByUser))
         if callable(animation):
             surface.open(title or "fba")
             surface.tell("Preparing the figure", 0.25)
@@ -116,6 +117,7 @@ def play(
             _resume(session, resumed)
             paused = not resumed.playing
         return _run(window, surface, paused=paused)
+    return ()  # closed before the scene was there
 
 
 def _run(window: Window, surface: Surface, *, paused: bool) -> tuple[Path, ...]:

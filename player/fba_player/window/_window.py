@@ -222,7 +222,6 @@ class Window(Closing):
     def _prepare(self) -> None:
         """Prepare what draws."""
         glfw = self._glfw
-        glfw.set_window_should_close(self._window, False)
         self._covering = Covering(glfw, self._window)
         rates = [glfw.get_video_mode(monitor).refresh_rate for monitor in glfw.get_monitors()]
         self._least = LEAST_SHARE / max([*rates, USUAL_RATE])

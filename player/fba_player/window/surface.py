@@ -103,6 +103,10 @@ class Resumed:
     lanes: str
 
 
+class ClosedByUser(Exception):
+    """The window was closed before the scene was there."""
+
+
 class Surface:
     """A window that stays from one scene to the next; a context manager.
 
@@ -135,6 +139,7 @@ class Surface:
         self.title = title
         if self.window is not None:
             self.glfw.set_window_title(self.window, title)
+            self.glfw.set_window_should_close(self.window, False)
             return
         self.glfw = start_glfw(self._problems)
         self._listening.enter_context(compilation_listener(self.tell_of_compiling))
@@ -148,10 +153,15 @@ class Surface:
             raise
 
     def tell(self, step: str, done: float) -> None:
-        """Show what is being prepared, until `show_scene`, and the share done; not for a file shown again."""
+        """Show what is being prepared, until `show_scene`, and the share done; not for a file shown again.
+
+        Raises ClosedByUser if the user has closed the window meanwhile.
+        """
         if self.window is not None and self.resumed is None:
             self._step = (step, done)
             self._draw_opening()
+            if self.glfw.window_should_close(self.window):
+                raise ClosedByUser
 
     def tell_of_compiling(self) -> None:
         """Show that one more function is compiled, if the window is still being prepared."""
@@ -233,6 +243,7 @@ class Surface:
         size = self.pixels
         if size[0] < 1 or size[1] < 1:
             return
+        self.glfw.poll_events()  # or the desktop takes the program for hung
         page = opening_picture(size, self.scale, self.title, *self._step)
         texture = self.gl.texture(size, 4, page.tobytes())
         filled = self.gl.framebuffer([texture])

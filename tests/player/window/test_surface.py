@@ -289,6 +289,23 @@ def test_the_opening_page_says_what_is_prepared_and_how_far(
     assert COMPILING.format(FUNCTIONS_TOLD + 1) not in steps
 
 
+def test_a_window_closed_while_it_opens_shows_nothing_more(
+    surface: Surface, talking: Animation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def make() -> Scene:
+        surface.glfw.set_window_should_close(surface.window, True)  # as a click does
+        return Scene(talking)
+
+    shown: list[Window] = []
+    assert played(monkeypatch, make, shown.append, surface=surface) == ()
+    assert not shown
+    assert played(monkeypatch, talking, shown.append, surface=surface) == ()
+    assert not shown  # nor what follows
+    surface.open("again")
+    played(monkeypatch, lambda: Scene(talking), shown.append, surface=surface)
+    assert len(shown) == 1
+
+
 @pytest.mark.parametrize(("size", "scale"), [((640, 480), 1.0), ((1280, 960), 2.0), ((90, 40), 1.0)])
 def test_the_opening_page_has_its_parts(size: tuple[int, int], scale: float) -> None:
     half, whole = (
