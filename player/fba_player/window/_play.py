@@ -27,7 +27,7 @@ from fba_player.session._source import Source
 from fba_player.sound._peaks import Peaks
 from fba_player.view._camera import Camera
 from fba_player.window._window import WARNING_SECONDS, Window
-from fba_player.window.surface import ClosedByUser, Resumed, Surface
+from fba_player.window.surface import WindowClosedError, Resumed, Surface
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
@@ -92,7 +92,7 @@ def play(
             surface = stack.enter_context(Surface(size))
         else:
             surface.memory = Memory()
-        stack.enter_context(contextlib.suppress(ClosedByUser))
+        stack.enter_context(contextlib.suppress(WindowClosedError))
         if callable(animation):
             surface.open(title or "fba")
             surface.tell("Preparing the figure", 0.25)

@@ -103,7 +103,7 @@ class Resumed:
     lanes: str
 
 
-class ClosedByUser(Exception):
+class WindowClosedError(Exception):
     """The window was closed before the scene was there."""
 
 
@@ -155,13 +155,13 @@ class Surface:
     def tell(self, step: str, done: float) -> None:
         """Show what is being prepared, until `show_scene`, and the share done; not for a file shown again.
 
-        Raises ClosedByUser if the user has closed the window meanwhile.
+        Raises WindowClosedError if the user has closed the window meanwhile.
         """
         if self.window is not None and self.resumed is None:
             self._step = (step, done)
             self._draw_opening()
             if self.glfw.window_should_close(self.window):
-                raise ClosedByUser
+                raise WindowClosedError
 
     def tell_of_compiling(self) -> None:
         """Show that one more function is compiled, if the window is still being prepared."""
