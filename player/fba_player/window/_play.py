@@ -27,7 +27,7 @@ from fba_player.session._source import Source
 from fba_player.sound._peaks import Peaks
 from fba_player.view._camera import Camera
 from fba_player.window._window import WARNING_SECONDS, Window
-from fba_player.window.surface import WindowClosedError, Resumed, Surface
+from fba_player.window.surface import Resumed, Surface, WindowClosedError
 
 if TYPE_CHECKING:
     from fba_player.view.protocols import Showable
