@@ -47,10 +47,15 @@ class Up:
 
 @dataclass(frozen=True)
 class _Floor:
-    """The floor at the low end of an axis: whether joints rest on it, and whether these carry the body."""
+    """The floor at the low end of an axis.
+
+    touched: whether joints rest on it. carries: whether these carry the body. at_zero: whether it is at the
+    height 0 of the file, as most makers of captures have it.
+    """
 
     touched: bool
     carries: bool
+    at_zero: bool
 
 
 def find_up_axis(source: MappedMotion, sample: MappedMotion, at_rest: standing.Stance, up: str) -> Up:
@@ -81,6 +86,10 @@ def find_up_axis(source: MappedMotion, sample: MappedMotion, at_rest: standing.S
         return Up(rest_axis, max(clear, 0.8), reason)
     floors = _find_floors(source)
     stood = upright and floors[trunk].carries
+    if stood and floors[trunk].at_zero:
+        doubt = f"people stand along it, at height 0, while the rest pose stands along {rest_axis}"
+        reason = f"{trunk}: people stand along it, at height 0 of the file"
+        return Up(trunk, 0.8, reason, doubt, rest_axis)
     if floors[rest_axis].carries or (floors[rest_axis].touched and not stood):
         doubt = ""
         if trunk != rest_axis and clear >= TUNING.min_up_length and floors[trunk].touched:
@@ -151,7 +160,8 @@ def _find_floors(source: MappedMotion) -> dict[str, _Floor]:
         room = TUNING.max_off_centre * size
         above = ((centre < ends[0].max(axis=1) + room) & (centre > ends[1].min(axis=1) - room)).all(axis=1)
         shares = float(touched.mean()), float((touched & above).mean())
-        result[name] = _Floor(*(share >= TUNING.min_carried_share for share in shares))
+        often = [share >= TUNING.min_carried_share for share in shares]
+        result[name] = _Floor(*often, at_zero=abs(level) < TUNING.max_floor_distance * size)
     return result
 
 

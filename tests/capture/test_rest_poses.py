@@ -62,6 +62,18 @@ def test_the_motion_says_which_way_is_up() -> None:
     assert prepare(captured, SKELETON, up="+y").up == "+y"
 
 
+def test_people_stand_at_the_height_0() -> None:
+    """Somebody who stands still, z up, could lie on a wall, as far as their rest goes."""
+    turn = Rotation.from_euler("xz", [90, 180], degrees=True)
+    captured = motion("A", 8, turns={"Hips": turn})
+    still = replace(captured, positions=np.tile([0.0, 0.0, 1.0], (8, 1)))
+    with pytest.warns(FbaWarning, match=r"up is taken to be \+z: people stand along it, at height 0"):
+        assert prepare(still, SKELETON).up == "+z"
+    on_the_floor = replace(captured, positions=np.tile([0.0, 0.1, 0.3], (8, 1)))
+    with pytest.warns(FbaWarning, match=r"up is taken to be \+y: joints rest on a floor along it"):
+        assert prepare(on_the_floor, SKELETON).up == "+y"
+
+
 LEAP = {"Hips": Rotation.from_euler("x", 90, degrees=True),
         "LeftUpLeg": Rotation.from_euler("x", -100, degrees=True),
         "RightUpLeg": Rotation.from_euler("x", -100, degrees=True)}  # fmt: skip
