@@ -182,6 +182,8 @@ class Session:
     def notices(self) -> list[Notice]:
         """Return the current notices, oldest first."""
         now = self.clock()
+        if not self.unsaved:
+            self._notices = [notice for notice in self._notices if notice.about != "leave"]
         self._notices = [notice for notice in self._notices if notice.until > now]
         return list(self._notices)
 

@@ -39,6 +39,13 @@ def test_closing_again_within_six_seconds_discards(session: Session) -> None:
     assert session.closing
 
 
+def test_the_warning_goes_once_the_work_is_saved(session: Session) -> None:
+    session.unsaved = {"the take"}
+    session.leave()
+    session.unsaved.clear()
+    assert not session.notices()
+
+
 def test_without_unsaved_work_it_closes_at_once(session: Session) -> None:
     session.leave()
     assert session.closing
