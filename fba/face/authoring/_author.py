@@ -32,7 +32,14 @@ from fba.face.authoring.regions.jaw import (
 from fba.face.authoring.surface._fold_limits import Limiter
 from fba.face.authoring.surface._motion import Motion, build_tables, split_by_part, unfold
 from fba.face.authoring.surface._motion_limits import eased_linear_motion, stop_at_folds
-from fba.face.authoring.surface.attached_parts import ATTACHED_DISTANCE, MAX_ATTACHED_SIZE, Anchors, attach
+from fba.face.authoring.surface.attached_parts import (
+    ATTACHED_DISTANCE,
+    MAX_ATTACHED_SIZE,
+    Anchors,
+    Roots,
+    attach,
+    root_at,
+)
 from fba.face.authoring.surface.binding import Binding, bind_points, face_size, separate_lips
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks, find_landmarks, weld_skin
 from fba.face.authoring.surface.surface import Surface
@@ -156,10 +163,13 @@ def _check_size(parts: tuple[Part, ...]) -> None:
         )
 
 
-def _attach_parts(marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, Eye]) -> dict[str, Anchors]:
+def _attach_parts(
+    marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, Eye]
+) -> dict[str, Anchors | Roots]:
     """Return the attachment to the skin of each part that moves with it, by name; what is in an eye stays."""
-    result = {}
+    result: dict[str, Anchors | Roots] = {}
     es = marks.fapu.ES * 1024
+    margins = np.concatenate([marks.contour(f"{side} {lid} lid") for side, lid in LIDS.values()])
     for part in parts:
         if part.kind not in CARRIED_KINDS or not len(part.triangles):
             continue
@@ -167,7 +177,10 @@ def _attach_parts(marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, 
             continue
         if part.kind == "other" and _is_in_eyes(part, eyes):
             continue
-        anchors = attach(marks.surface, part)
+        anchors: Anchors | Roots = attach(marks.surface, part)
+        if part.kind == "lash" and len(margins):
+            roots = root_at(marks.surface, part, margins)
+            anchors = roots if np.median(roots.distance) < ATTACHED_DISTANCE * es else anchors
         if np.median(anchors.distance) < ATTACHED_DISTANCE * es:
             result[part.name] = anchors
     return result
@@ -200,7 +213,7 @@ class _Authoring:
     marks: Landmarks
     limiter: Limiter
     eyes: dict[str, Eye]
-    anchors: dict[str, Anchors]
+    anchors: dict[str, Anchors | Roots]
     moves: dict[int, dict[str, Motion]] = field(default_factory=dict)
     turns: dict[int, list[FaceDefTransform]] = field(default_factory=dict)
     lost: dict[int, str] = field(default_factory=dict)
@@ -283,7 +296,9 @@ class _Authoring:
             return
         self._add_to_surface(fap, motion)
         for part in self.parts:
-            if part.kind == "lash" and part.name in self.anchors:
+            if part.kind == "brow" and sculpted is not None:  # it can lie on skin that a drawn lid stretches
+                self.moves[fap].pop(part.name, None)
+            elif part.kind == "lash" and part.name in self.anchors:
                 self.moves[fap][part.name] = lash_motion(self.marks, eye, fap, part, motion)
 
     def _add_eyeballs(self) -> None:

@@ -267,3 +267,19 @@ def test_a_point_of_a_lip_on_the_vertex_of_another_is_lost_alone(
         finding for finding in check_faps(model, [4, 6, 7, 51, 53, 54, 60]) if finding.severity == "error"
     ]
     assert not errors
+
+
+def test_a_drawn_lash_stays_with_its_lid_as_the_brow_rises(
+    parts: list[Part], points: np.ndarray, bound: np.ndarray
+) -> None:
+    """It is so broad that it lies on skin that the brow lifts, which took it along."""
+    skin = next(part for part in parts if part.kind == "skin")
+    margin, brow = (points[point_rows()[name]] for name in ("3.1", "4.3"))
+    band = np.stack(
+        [margin + share * (brow - margin) + (x, 0, 0.001) for share in (0.0, 0.8) for x in (0, 0.004)]
+    )
+    lash = Part("lash", "lash", band.astype(np.float32), np.array([(0, 1, 3), (0, 3, 2)], dtype=np.int32))
+    model = author([*parts, lash], points, bound=bound)
+    moved = {mesh.part for mesh in model.table_of[33].meshes}
+    assert moved == {skin.name}
+    assert "lash" in {mesh.part for mesh in model.table_of[19].meshes}

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from fba.errors import ModelError
 from fba.face._tables import FaceDefMesh, FaceDefTables
 from fba.face.authoring._shapes.morphs import add_shapes
+from fba.face.authoring.regions._lids import _bulge
 from fba.face.authoring.surface.surface import weld_parts
 from fba.face.checks import check_faps
 from fba.face.deform._deformer import Deformer
@@ -159,6 +160,16 @@ def test_a_lid_moves_as_its_sculptor_closed_it(base: FaceModel) -> None:
     ratio = np.linalg.norm(way[crease], axis=1) / moved[crease]
     assert 1.35 < float(np.median(ratio)) < 1.85
     np.testing.assert_allclose(shift(shaped, 20, 1024), shift(base, 20, 1024), atol=1e-6)
+
+
+def test_a_lid_bulges_no_more_than_its_sculptor_wants() -> None:
+    """As of drawn eyes: arcs about the ball pushed the skin over the brow."""
+    values = np.array([-400.0, 0.0, 512.0, 1024.0])
+    arcs = (values / 1024)[:, None, None] * np.array([(0, -9, 5), (0, -9, 1.9), (0, -9, 1), (0, -9, -4)])
+    sculpted = np.array([(3, -9, -2), (3, -9, 1), (3, -9, 0), (3, -9, -2)])
+    further = _bulge(arcs, sculpted, values, 1.0)
+    np.testing.assert_allclose(further[:3], [[0] * 4, [0] * 4, further[3] / 2])
+    np.testing.assert_allclose(further[3], [7, 0, 0, 0])
 
 
 def test_tables_that_break_the_rules_are_replaced(base: FaceModel) -> None:

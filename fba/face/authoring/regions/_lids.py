@@ -93,6 +93,10 @@ MIN_MEASURED_HEIGHT = 0.35
 a margin."""
 LEAST_SCULPTED = 0.08
 """Least share of the opening by which a shape moves a margin that it shows how to move."""
+MOST_BULGE = 0.02
+"""Distance in ES0 by which the arcs of a lid may push skin further forward than its sculptor did."""
+EDGE_SHARE = 0.7
+"""Share of the margin's motion from which skin belongs to the edge of a lid more and more."""
 LEAST_TURN = 0.3
 """Least motion of a margin, as a share of its largest, against which that of other vertices is measured."""
 MAX_SUNK = 0.03
@@ -135,6 +139,11 @@ def lid_motion(
     points = marks.surface.vertices[vertices]
     values = lid_values(fap)
     shifts = slide_lid(points, share[vertices], opening, eye, lid, values / CLOSED)
+    if sculpted is not None and follows:
+        free = np.clip((1 - share[vertices]) / (1 - EDGE_SHARE), 0.0, 1.0)
+        shifts[:, :, 2] -= free * _bulge(
+            shifts, sculpted[vertices], values, MOST_BULGE * marks.fapu.ES * 1024
+        )
     margins = np.concatenate([own, other])
     pinned = marks.surface.mask(margins)
     if eye.flat:  # the lids of a drawn eye slide in front of it, where no ball is in their way
@@ -168,6 +177,18 @@ def lid_motion(
         motion.vertices,
         np.concatenate([limited.shifts[up], closing.shifts[down]]),
     )
+
+
+def _bulge(shifts: Float64, sculpted: Float64, values: Float64, most: float) -> Float64:
+    """Return (K, N) by how far shifts (K, N, 3) push skin forward beyond a sculptor's (N, 3), metres.
+
+    Up to `most` that does not matter. Above a drawn eye, which is large and flat, arcs about its ball would
+    push the skin over the brow.
+    """
+    closed = shifts[np.abs(values - CLOSED).argmin()]
+    further = np.maximum(closed[:, 2] - sculpted[:, 2], 0.0)
+    further *= smoothstep(further / most - 1)
+    return np.asarray(np.clip(values / CLOSED, 0.0, 1.0)[:, None] * further)
 
 
 def sculpted_share(marks: Landmarks, opening: Opening, eye: Eye, lid: str, shift: Float64) -> Float64 | None:
@@ -299,7 +320,8 @@ def lash_motion(marks: Landmarks, eye: Eye, fap: int, part: Part, skin: Motion) 
     of_root = root[shape.number[moving]]
     hair = _single_hairs(shape.vertices[root, 0], pieces, MAX_HAIR_WIDTH * wide)
     columns = _shared(shape.vertices[root, :1], pieces, hair)[shape.number[moving], 0]
-    ways = np.clip(skin.values, *_moving_range(skin)) / CLOSED
+    # they do not turn as an eye is opened wide: drawn eyes are so flat that they would stand on end
+    ways = np.maximum(np.clip(skin.values, *_moving_range(skin)) / CLOSED, 0.0)
     turns = slide_lid(points, np.ones(len(points)), opening, eye, lid, ways, columns=columns)
     # roots stay in the skin, which a fold or the other lid may have stopped
     _, nearest = cKDTree(marks.surface.vertices[skin.vertices]).query(shape.vertices[root])

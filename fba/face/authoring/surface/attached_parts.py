@@ -55,6 +55,38 @@ class Anchors:
         return Motion(motion.values, moving, shifts)
 
 
+@dataclass(frozen=True, eq=False)
+class Roots:
+    """The lashes of a part, which grow from the margins of lids; made by `root_at`.
+
+    surface: the skin. margin: (V,), its vertex at the root of each of the part's. distance: (V,) from that
+    to the root, metres.
+    """
+
+    surface: Surface
+    margin: Intp
+    distance: Float64
+
+    def carry(self, motion: Motion) -> Motion:
+        """Return the part's motion for one of the surface: vertices go where the margin goes.
+
+        A drawn lash can lie on skin that moves with the brow.
+        """
+        moving = np.flatnonzero(self.surface.mask(motion.vertices)[self.margin])
+        rows = np.searchsorted(motion.vertices, self.margin[moving])
+        return Motion(motion.values, moving, motion.shifts[:, rows])
+
+
+def root_at(surface: Surface, part: Part, margins: Intp) -> Roots:
+    """Return the roots of a part's lashes at the nearest of some vertices of the skin."""
+    from scipy.spatial import cKDTree
+
+    shape = weld_parts([part])
+    away, nearest = cKDTree(surface.vertices[margins]).query(shape.vertices)
+    root = hair_roots(shape, away)[shape.number]
+    return Roots(surface, margins[nearest[root]], away[root])
+
+
 def attach(surface: Surface, part: Part) -> Anchors:
     """Return the attachment of a part to the nearest triangles of the skin; lashes hang by their roots."""
     from scipy.spatial import cKDTree
