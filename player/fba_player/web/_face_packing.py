@@ -147,6 +147,7 @@ def _pack_shape(container: Container, shape: FaceShape | None, rows: Int64) -> d
         return {"ball": True}
     header: dict[str, Any] = {
         "scatter": shape.scatter,
+        "folds": shape.folds,
         "closed": shape.closed,
         "smooth": shape.smooth,
         "opaque": shape.picture is None or shape.picture.opaque,

@@ -1,7 +1,7 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
 // multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds a relief; LIMBS lets a body's limbs keep
-// the sky from each other; SHADED lets bodies throw shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where
+// the sky from each other, FOLDS the folds of their clothes grow where they bend; SHADED lets bodies throw shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where
 // it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
@@ -43,6 +43,9 @@ centroid out vec4 wrinkles;
 #ifdef LIMBS
 uniform vec4 limbs[24]; // both ends of each, and its radius
 #endif
+#ifdef FOLDS
+centroid out float folded;       // how much deeper than in the picture folds are
+#endif
 #ifdef HAIRS
 in vec4 in_across;      // of hairs: from the opposite vertex to this one, and half the width; else 0, 0, 0, 1
 in vec4 in_along;       // of hairs: direction to the tip, and which of the two sides this is
@@ -77,6 +80,35 @@ float past_limbs(vec3 at, vec3 n) {
         if (towards > 0.0) past *= 1.0 - min(min(radius * radius * per, 1.0) * 1.4 * towards * sqrt(per), 0.9);
     }
     return past;
+}
+#endif
+
+#ifdef FOLDS
+// How much deeper folds are near a joint: on the inside of the bend they grow, elsewhere cloth is smooth. before,
+// after: directions of the limbs that meet there, both downwards.
+float bent(vec3 at, vec3 joint, vec3 before, vec3 after, float reach) {
+    vec3 away = at - joint;
+    float squared = dot(away, away), near = max(1.0 - squared / (reach * reach), 0.0);
+    return near * (1.8 * dot(away, after - before) * inversesqrt(squared + 1e-4) - 0.35);
+}
+
+// Limbs by their numbers in `CAPSULES` of `fba_player._figure.body_light`; lengths (m) of the library's own figures.
+float folds(vec3 at) {
+    vec3 trunk = (limbs[0].xyz - limbs[1].xyz) / 0.39;
+    float deeper = 0.0;
+    for (int side = 0; side < 2; ++side) {
+        vec4 shoulder = limbs[4 + 2 * side], hip = limbs[16 + 2 * side], knee = limbs[20 + 2 * side];
+        vec3 thigh = (knee.xyz - hip.xyz) / 0.43;
+        deeper += bent(at, shoulder.xyz, trunk, (limbs[5 + 2 * side].xyz - shoulder.xyz) / 0.29, 0.26);
+        deeper += bent(at, hip.xyz, trunk, thigh, 0.24);
+        deeper += bent(at, knee.xyz, thigh, (limbs[21 + 2 * side].xyz - knee.xyz) / 0.42, 0.22);
+    }
+    // The waist, which leans and turns between hips and shoulders.
+    vec3 hips = (limbs[16].xyz - limbs[18].xyz) / 0.19, shoulders = (limbs[4].xyz - limbs[6].xyz) / 0.37;
+    vec3 away = at - limbs[0].xyz + 0.05 * trunk;
+    float near = max(1.0 - dot(away, away) / 0.06, 0.0);
+    deeper += near * (8.0 * dot(away, hips) * dot(shoulders - hips, trunk) + 3.0 * length(cross(hips, shoulders)) - 0.35);
+    return clamp(deeper, -0.7, 0.8);
 }
 #endif
 
@@ -128,6 +160,9 @@ void main() {
 #ifndef FINELY
     reach.x *= unshaded(before);
 #endif
+#endif
+#ifdef FOLDS
+    folded = folds(at);
 #endif
 #ifdef WRINKLED
     wrinkle_place = in_wrinkle;

@@ -73,7 +73,8 @@ void main() {
 #ifdef CONTACT
         rise = max((1.0 - seen.y / max(seen.x, 1e-4)) * HIGHEST, TOUCHING);
         apart = rise * rise + away;
-        hides = 0.7 * hides + 0.9 * rise * rise / (apart * apart);
+        // The dark line along a sole belongs to what touches the ground: a raised toe has none.
+        hides = mix(hides, 0.7 * hides + 0.9 * rise * rise / (apart * apart), min(2.0 * TOUCHING * TOUCHING / (rise * rise), 1.0));
 #endif
         sky += seen.x * area * hides;
         vec2 before = along_key(ground + spiral(k, 0.5) * KEY_REACH, 0.2 * KEY_REACH * KEY_REACH);
