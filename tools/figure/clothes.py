@@ -29,7 +29,7 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
-INSIDE = 1.6
+INSIDE = 1.7
 """Brightness of the inside of clothes and of their rims, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.918, 0.982
 TURN_UP = (0.073, 0.45)
@@ -56,7 +56,7 @@ HEMMED, STITCHED = 0.0018, 0.0006
 """Metres by which cloth stands out where it is doubled along an edge, and by which stitches draw it in."""
 ROUNDED = ((0.0012, -0.0003), (0.0021, -0.0014), (0.0020, -0.0028))
 """Rows that round an edge: metres beyond it, and outwards."""
-LEANING = (0.9, 0.8, 0.6, 0.4)
+LEANING = (1.6, 1.4, 1.1, 0.8)
 """Shares of outwards to beyond in the normals of these rows and of what is folded in.
 
 Surfaces that face the limb would be nearly black, and a dark rim narrower than a pixel looks jagged.

@@ -79,7 +79,9 @@ def slim_arms(looks: Looks, body: BodyModel) -> Float64:
         _, _, outward = arms.arm_place(mirrored, left)
         height = (arms.shape_arm(mirrored, left, arm > 0) * outward).sum(axis=1, keepdims=True)
         moved -= share * (1 - looks.muscles) * height * body.normals
-        moved += share * (1 - looks.girth) * (nearest(body.vertices, body.bind[joints, :3, 3]) - body.vertices)
+        moved += (
+            share * (1 - looks.girth) * (nearest(body.vertices, body.bind[joints, :3, 3]) - body.vertices)
+        )
     return moved
 
 

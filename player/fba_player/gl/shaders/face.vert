@@ -1,8 +1,9 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
 // multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds a relief; LIMBS lets a body's limbs keep
-// the sky from each other, FOLDS the folds of their clothes grow where they bend; SHADED lets bodies throw shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where
-// it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
+// the sky from each other; FOLDS makes the folds of its clothes grow where they bend; SHADED lets bodies throw
+// shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where it is low, VEIL blends
+// by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
 // All that is passed on is `centroid`: many triangles of a small face are smaller than a pixel, and values at the
@@ -84,30 +85,24 @@ float past_limbs(vec3 at, vec3 n) {
 #endif
 
 #ifdef FOLDS
-// How much deeper folds are near a joint: on the inside of the bend they grow, elsewhere cloth is smooth. before,
-// after: directions of the limbs that meet there, both downwards.
-float bent(vec3 at, vec3 joint, vec3 before, vec3 after, float reach) {
-    vec3 away = at - joint;
-    float squared = dot(away, away), near = max(1.0 - squared / (reach * reach), 0.0);
-    return near * (1.8 * dot(away, after - before) * inversesqrt(squared + 1e-4) - 0.35);
+// How much deeper folds are near a joint that is so far away. bend: from the direction of the limb above it to that
+// of the limb below. On the inside of the bend they grow; elsewhere cloth is smooth.
+float bent(vec3 away, vec3 bend) {
+    return max(1.0 - 17.0 * dot(away, away), 0.0) * (20.0 * dot(away, bend) - 0.35);
 }
 
-// Limbs by their numbers in `CAPSULES` of `fba_player._figure.body_light`; lengths (m) of the library's own figures.
+// Limbs have the order of `CAPSULES` in `fba_player._figure.body_light`, and the lengths of the library's figures.
 float folds(vec3 at) {
-    vec3 trunk = (limbs[0].xyz - limbs[1].xyz) / 0.39;
-    float deeper = 0.0;
-    for (int side = 0; side < 2; ++side) {
-        vec4 shoulder = limbs[4 + 2 * side], hip = limbs[16 + 2 * side], knee = limbs[20 + 2 * side];
-        vec3 thigh = (knee.xyz - hip.xyz) / 0.43;
-        deeper += bent(at, shoulder.xyz, trunk, (limbs[5 + 2 * side].xyz - shoulder.xyz) / 0.29, 0.26);
-        deeper += bent(at, hip.xyz, trunk, thigh, 0.24);
-        deeper += bent(at, knee.xyz, thigh, (limbs[21 + 2 * side].xyz - knee.xyz) / 0.42, 0.22);
+    vec3 trunk = (limbs[0].xyz - limbs[1].xyz) * 2.5;
+    vec3 hips = (limbs[16].xyz - limbs[18].xyz) * 5.2, shoulders = (limbs[4].xyz - limbs[6].xyz) * 2.7;
+    vec3 waist = at - limbs[0].xyz;
+    float leans = 0.5 * dot(shoulders - hips, trunk), turns = 8.0 * length(cross(hips, shoulders));
+    float deeper = bent(waist, leans * hips + turns * waist);
+    for (int k = 0; k < 4; k += 2) {
+        vec3 arm = limbs[k + 4].xyz, hip = limbs[k + 16].xyz, knee = limbs[k + 20].xyz, thigh = (knee - hip) * 2.3;
+        deeper += bent(at - arm, (limbs[k + 5].xyz - arm) * 3.5 - trunk) + bent(at - hip, thigh - trunk)
+            + bent(at - knee, (limbs[k + 21].xyz - knee) * 2.4 - thigh);
     }
-    // The waist, which leans and turns between hips and shoulders.
-    vec3 hips = (limbs[16].xyz - limbs[18].xyz) / 0.19, shoulders = (limbs[4].xyz - limbs[6].xyz) / 0.37;
-    vec3 away = at - limbs[0].xyz + 0.05 * trunk;
-    float near = max(1.0 - dot(away, away) / 0.06, 0.0);
-    deeper += near * (8.0 * dot(away, hips) * dot(shoulders - hips, trunk) + 3.0 * length(cross(hips, shoulders)) - 0.35);
     return clamp(deeper, -0.7, 0.8);
 }
 #endif
