@@ -115,7 +115,8 @@ class Cloth:
         number = {pair: count + k for k, pair in enumerate(zip(a.tolist(), b.tolist(), strict=True))}
         triangles: list[list[int]] = []
         for corners in self.triangles.tolist():
-            middles = [number.get((min(pair), max(pair))) for pair in zip(corners, corners[1:] + corners[:1])]
+            sides = ((corners[k], corners[(k + 1) % 3]) for k in range(3))
+            middles = [number.get((min(side), max(side))) for side in sides]
             triangles += _halve(corners, middles)
         arrays = (self.vertices, self.normals, self.weights, self.values)
         joined = [np.concatenate([old, new]) for old, new in zip(arrays, halves, strict=True)]

@@ -7,6 +7,7 @@ To be run after each change of `head.glb` (`make_head.py` does) or `body.glb` (`
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import arms
@@ -65,7 +66,7 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
 
 
 def slim_arms(looks: Looks, body: BodyModel) -> Float64:
-    """Return the vertices (V, 3) of the first figure's body with the girth and the muscles of another's arms."""
+    """Return the first figure's body (V, 3) with the girth and the muscles of another's arms."""
     names, moved = body.skeleton, body.vertices.astype(np.float64)
     standing = np.tile(np.eye(4), (len(names), 1, 1))
     standing[:, :3, 3] = names.centres
@@ -79,9 +80,8 @@ def slim_arms(looks: Looks, body: BodyModel) -> Float64:
         _, _, outward = arms.arm_place(mirrored, left)
         height = (arms.shape_arm(mirrored, left, arm > 0) * outward).sum(axis=1, keepdims=True)
         moved -= share * (1 - looks.muscles) * height * body.normals
-        moved += (
-            share * (1 - looks.girth) * (nearest(body.vertices, body.bind[joints, :3, 3]) - body.vertices)
-        )
+        bone = nearest(body.vertices, body.bind[joints, :3, 3])
+        moved += share * (1 - looks.girth) * (bone - body.vertices)
     return moved
 
 
@@ -94,7 +94,7 @@ def carried_share(body: BodyModel, joint: int) -> Float64:
 def nearest(points: Float32, line: Float64) -> Float64:
     """Return the points (N, 3) of a line through corners (K, 3) that are nearest to points (N, 3)."""
     found = []
-    for start, end in zip(line, line[1:], strict=False):
+    for start, end in pairwise(line):
         along = np.clip((points - start) @ (end - start) / ((end - start) ** 2).sum(), 0, 1)
         found.append(start + along[:, None] * (end - start))
     away = [np.linalg.norm(points - each, axis=1) for each in found]

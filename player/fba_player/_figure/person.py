@@ -262,7 +262,8 @@ def body_shape(part: BodyPart, joints: int, stored: dict[str, Any]) -> FaceShape
     open_surface = part.material.two_sided
     return replace(
         shape, scatter=float(part.kind in SCATTERING_KINDS), folds=bool(stored) and part.kind == "cloth",
-        two_sided=open_surface, closed=not open_surface, name="", coarser=detail_levels(part, carried.astype(np.float32), stored), casts=True,
+        two_sided=open_surface, closed=not open_surface, name="",
+        coarser=detail_levels(part, carried.astype(np.float32), stored), casts=True,
     )  # fmt: skip
 
 

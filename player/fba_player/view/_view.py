@@ -67,8 +67,7 @@ class FaceShape:
     triangles: int32 (F, 3), counter-clockwise from outside. colours: float32 (V, 4), linear light and gloss.
     sway: float32 (V,), 1 where the part turns with the head, 0 where it stays, as shoulders do. texcoords:
     float32 (V, 2), origin at the picture's top left. picture: texture that multiplies the colours. scatter:
-    how much light scatters below the surface, 1 for skin, 0 for cloth. folds: whether the folds in the picture
-    of a body's part grow where joints bend it. fine: strength of the skin's relief,
+    how much light scatters below the surface, 1 for skin, 0 for cloth. fine: strength of the skin's relief,
     and its repetitions over the picture. two_sided: False if the inside should look dark. across: float32
     (V, 8) for single hairs: direction from the opposite vertex, half the hair's width (m), direction to the
     tip, and 1 or -1 for its side; hairs narrower than a pixel are drawn a pixel wide and fainter. closed:
@@ -79,7 +78,7 @@ class FaceShape:
     simplified further for the shadow of one of several bodies; None to leave it as it is. smooth: False if
     triangles are so large that light changes visibly within them. wrinkle_places: float32 (V, 2), where each
     vertex lies in `fba_player._mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity, cutoff:
-    as of `fba.mesh._meshes.Material`.
+    as of `fba.mesh._meshes.Material`. folds: whether folds in its picture grow where joints of a body bend.
     """
 
     triangles: Int32
