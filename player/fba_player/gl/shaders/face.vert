@@ -1,9 +1,9 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
-// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds a relief; LIMBS lets a body's limbs keep
-// the sky from each other; FOLDS makes the folds of its clothes grow where they bend; SHADED lets bodies throw
-// shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where it is low, VEIL blends
-// by it and an opacity. Software OpenGL runs both branches of a
+// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds a relief; LIMBS lets a body's limbs
+// keep the sky from each other; FOLDS makes the folds of its clothes grow where they bend; SHADED lets bodies
+// throw shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where it is low,
+// VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
 // All that is passed on is `centroid`: many triangles of a small face are smaller than a pixel, and values at the
@@ -85,13 +85,14 @@ float past_limbs(vec3 at, vec3 n) {
 #endif
 
 #ifdef FOLDS
-// How much deeper folds are near a joint that is so far away. bend: from the direction of the limb above it to that
-// of the limb below. On the inside of the bend they grow; elsewhere cloth is smooth.
+// How much deeper folds are near a joint that is so far away. bend: from the direction of the limb above it
+// to that of the limb below. On the inside of the bend they grow; elsewhere cloth is smooth.
 float bent(vec3 away, vec3 bend) {
     return max(1.0 - 17.0 * dot(away, away), 0.0) * (20.0 * dot(away, bend) - 0.35);
 }
 
-// Limbs have the order of `CAPSULES` in `fba_player._figure.body_light`, and the lengths of the library's figures.
+// Limbs have the order of `CAPSULES` in `fba_player._figure.body_light`, and about the lengths of the
+// library's figures.
 float folds(vec3 at) {
     vec3 trunk = (limbs[0].xyz - limbs[1].xyz) * 2.5;
     vec3 hips = (limbs[16].xyz - limbs[18].xyz) * 5.2, shoulders = (limbs[4].xyz - limbs[6].xyz) * 2.7;
@@ -99,7 +100,8 @@ float folds(vec3 at) {
     float leans = 0.5 * dot(shoulders - hips, trunk), turns = 8.0 * length(cross(hips, shoulders));
     float deeper = bent(waist, leans * hips + turns * waist);
     for (int k = 0; k < 4; k += 2) {
-        vec3 arm = limbs[k + 4].xyz, hip = limbs[k + 16].xyz, knee = limbs[k + 20].xyz, thigh = (knee - hip) * 2.3;
+        vec3 arm = limbs[k + 4].xyz, hip = limbs[k + 16].xyz, knee = limbs[k + 20].xyz;
+        vec3 thigh = (knee - hip) * 2.3;
         deeper += bent(at - arm, (limbs[k + 5].xyz - arm) * 3.5 - trunk) + bent(at - hip, thigh - trunk)
             + bent(at - knee, (limbs[k + 21].xyz - knee) * 2.4 - thigh);
     }
