@@ -60,6 +60,8 @@ WIDE, AROUND = 0.68, 0.25
 """Metres of the picture along each side, and of a turn around an arm."""
 FIRST = -0.19
 """Metres beyond the elbow of its upper edge."""
+BELOW = (-0.070, 0.042)
+"""Metres beyond the elbow up to which the sleeve darkens the skin below it, and over which that begins."""
 WHITE = 0.78
 """Linear light of even skin in the picture; the colours of vertices are divided by it."""
 
@@ -140,11 +142,13 @@ def _paint_arm(turn: Float64, along: Float64, seed: int) -> Float64:
         dark += depth * line * smoothstep(1 - np.abs(degrees - at) / wide)
     for points in VEINS:
         knots = np.array(points)
-        away = (degrees - np.interp(along, knots[:, 0], knots[:, 1]) - 900 * wander) / 360 * AROUND
+        bend = 900 * wander + 7 * noise(p, 0.05, seed + 9)
+        away = (degrees - np.interp(along, knots[:, 0], knots[:, 1]) - bend) / 360 * AROUND
         ends = smoothstep((along - knots[0, 0]) / 0.02) * smoothstep((knots[-1, 0] - along) / 0.02)
         vein = np.maximum(vein, np.exp(-((away / 0.0022) ** 2)) * ends)
     factor = 1 - 0.13 * blood[:, None] * np.array((0.25, 1.0, 0.95))
     factor *= 1 - 0.15 * brown[:, None] * np.array((0.75, 1.0, 1.25))
     factor *= 1 - 0.10 * freckles[:, None] * np.array((0.6, 1.0, 1.2))
     factor *= 1 - dark[:, None] * np.array((0.75, 1.0, 1.0))
-    return factor * (1 - 0.10 * vein[:, None] * np.array((1.3, 0.7, 0.4)))
+    factor *= 1 - 0.42 * smoothstep((BELOW[0] - along) / BELOW[1])[:, None] * np.array((0.85, 1.0, 1.0))
+    return factor * (1 - 0.07 * vein[:, None] * np.array((1.3, 0.7, 0.4)))

@@ -29,7 +29,7 @@ MIRROR = np.array([_NAMES.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2
 SHIRT = np.array([0.052, 0.088, 0.125])
 """Linear light."""
 TROUSERS = np.array([0.054, 0.059, 0.070])
-INSIDE = 1.6
+INSIDE = 1.7
 """Brightness of the inside of clothes and of their rims, relative to the cloth: little light gets there."""
 HEM, WAIST = 0.918, 0.982
 TURN_UP = (0.073, 0.45)
@@ -48,13 +48,15 @@ NECKLINE = (
 """Degrees from the front about the neck, and the height of the collar there."""
 FOLD, DEEP = 0.003, 0.022
 """Metres by which the inside of an edge reaches below the skin, and back under the cloth."""
+LONGEST, REFINED = 0.0175, 2
+"""Metres to which edges of the cloth are halved, so that outlines are round, and how often at most."""
 NEAREST = 4
 """Vertices of the cloth from which what is folded in under them has its weights."""
 HEMMED, STITCHED = 0.0018, 0.0006
 """Metres by which cloth stands out where it is doubled along an edge, and by which stitches draw it in."""
 ROUNDED = ((0.0012, -0.0003), (0.0021, -0.0014), (0.0020, -0.0028))
 """Rows that round an edge: metres beyond it, and outwards."""
-LEANING = (0.9, 0.8, 0.6, 0.4)
+LEANING = (1.6, 1.4, 1.1, 0.8)
 """Shares of outwards to beyond in the normals of these rows and of what is folded in.
 
 Surfaces that face the limb would be nearly black, and a dark rim narrower than a pixel looks jagged.
@@ -173,19 +175,35 @@ def _make_garment(
     values = np.stack([value, kind, thick, slack], axis=1)
     cloth = Cloth(surface.vertices, normals, body.weights, values, triangles).cut_above(value)
     cloth, _ = cloth.split(cloth.values[:, 0] - band)
-    kinds = np.rint(cloth.values[:, 1])
-    lines = np.unique(cloth.border), np.flatnonzero(np.abs(cloth.values[:, 0] - band) < 1e-9)
-    rim = lines[0]
     free = np.ones(len(cloth.vertices))
-    free[rim] = 0
+    free[np.unique(cloth.border)] = 0
     outward = cloth.smooth_rows(cloth.normals, np.ones(len(free)), rounds)
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     vertices = cloth.smooth_rows(cloth.vertices, cloth.values[:, 3] * free, rounds)
     # Smoothing must not sink the cloth into the body.
     sunk = np.minimum(((vertices - cloth.vertices) * outward).sum(axis=1), 0.0)
-    thickness = cloth.values[:, 2]
-    vertices = vertices + outward * (thickness - sunk)[:, None]
-    vertices = _even_rim(vertices, cloth.border, rim)
+    vertices = vertices + outward * (cloth.values[:, 2] - sunk)[:, None]
+    values = np.concatenate([cloth.values[:, :3], cloth.vertices[:, :1], outward], axis=1)
+    normals = vertex_normals(vertices, cloth.triangles).astype(np.float64)
+    cloth = Cloth(vertices, normals, cloth.weights, values, cloth.triangles)
+    for _ in range(REFINED):
+        cloth = cloth.refine(LONGEST)
+    return _hem(cloth, edge_distance, value, colour, band)
+
+
+def _hem(
+    cloth: Cloth, edge_distance: EdgeDistance, covered: Float64, colour: Float64, band: float
+) -> Garment:
+    """Return the garment of a cloth, with its edges evened, doubled, rounded and folded in.
+
+    values (V, 7) of the cloth: distance to the edge, which edge, metres off the skin, x as modelled, which
+    tells the halves apart, and directions outwards. covered: as of `Garment`. Others: as for `_make_garment`.
+    """
+    thickness, side, outward = cloth.values[:, 2], cloth.values[:, 3], unit(cloth.values[:, 4:])
+    kinds = np.rint(cloth.values[:, 1])
+    lines = np.unique(cloth.border), np.flatnonzero(np.abs(cloth.values[:, 0] - band) < 1e-9)
+    rim = lines[0]
+    vertices = _even_rim(cloth.vertices, cloth.border, rim)
     for rows, level in zip(lines, (0.0, band), strict=True):
         vertices[rows] = _move_onto_edge(
             vertices[rows], level, lambda p, rows=rows: edge_distance(p, kinds[rows])
@@ -218,7 +236,7 @@ def _make_garment(
     turned = np.concatenate([np.zeros_like(vertices), *facing])
     across = np.concatenate([cloth.values[:, 0], *[cloth.values[rim, 0]] * len(rows)])
     shade = np.where(inner, INSIDE, 1.0)
-    side = np.concatenate([cloth.vertices[:, 0], *[cloth.vertices[rim, 0]] * len(rows)])
+    side = np.concatenate([side, *[side[rim]] * len(rows)])
     values = np.concatenate([weights, across[:, None], turned], axis=1)
     everything, values, faces, shade = _mirror(everything, values, faces, shade, side)
     everything, values, faces, tone = _split_by_shade(everything, values, faces, shade)
@@ -226,7 +244,7 @@ def _make_garment(
     inside = facing.any(axis=1)
     tone[~inside] = 1.0
     colours = np.concatenate([tone[:, None] * colour, np.full((len(tone), 1), 0.06)], axis=1)
-    return Garment(everything, faces, colours, weights, value, inside, within, facing)
+    return Garment(everything, faces, colours, weights, covered, inside, within, facing)
 
 
 def _move_onto_edge(positions: Float64, level: float, edge_distance: Callable[[Float64], Float64]) -> Float64:

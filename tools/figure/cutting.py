@@ -96,6 +96,32 @@ class Cloth:
         corners = level[cloth.triangles]
         return cloth.select((corners >= 0).all(axis=1) & (corners > 0).any(axis=1))
 
+    def refine(self, longest: float) -> Cloth:
+        """Return the cloth with all edges longer than `longest` (m) halved, once.
+
+        Middles lie on the curve between both ends that their normals give, so that outlines get rounder.
+        """
+        edges = self.edges
+        a, b = edges.T
+        way = self.vertices[b] - self.vertices[a]
+        long = np.linalg.norm(way, axis=1) > longest
+        a, b, way = a[long], b[long], way[long]
+        halves = list(self.interpolate_rows(a, b, np.full(len(a), 0.5)))
+        for end, sign in ((a, -1.0), (b, 1.0)):
+            normal = self.normals[end]
+            halves[0] += sign * (way * normal).sum(axis=1, keepdims=True) * normal / 8
+        halves[1] /= np.linalg.norm(halves[1], axis=1, keepdims=True)
+        count = len(self.vertices)
+        number = {pair: count + k for k, pair in enumerate(zip(a.tolist(), b.tolist(), strict=True))}
+        triangles: list[list[int]] = []
+        for corners in self.triangles.tolist():
+            sides = ((corners[k], corners[(k + 1) % 3]) for k in range(3))
+            middles = [number.get((min(side), max(side))) for side in sides]
+            triangles += _halve(corners, middles)
+        arrays = (self.vertices, self.normals, self.weights, self.values)
+        joined = [np.concatenate([old, new]) for old, new in zip(arrays, halves, strict=True)]
+        return Cloth(joined[0], joined[1], joined[2], joined[3], np.array(triangles))
+
     def smooth_rows(self, array: Float64, free: Float64, rounds: int) -> Float64:
         """Return rows (V, N) moved to their neighbours' mean by shares free (V,), `rounds` times."""
         edges = self.edges
@@ -116,6 +142,22 @@ def _cut(corners: list[int], height: Float64, number: dict[tuple[int, int], int]
         middle = number.get((min(b, c), max(b, c)))
         if middle is not None:
             return [[a, b, middle], [a, middle, c]]
+    return [corners]
+
+
+def _halve(corners: list[int], middles: list[int | None]) -> list[list[int]]:
+    """Return the one to four triangles of a triangle with middles of its sides; None: not halved."""
+    for turn in range(3):
+        a, b, c = corners[turn:] + corners[:turn]
+        ab, bc, ca = middles[turn:] + middles[:turn]
+        if ab is None:
+            continue
+        if bc is not None and ca is not None:
+            return [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        if ca is not None:
+            return [[a, ab, ca], [ab, b, c], [ab, c, ca]]
+        if bc is None:
+            return [[a, ab, c], [ab, b, c]]
     return [corners]
 
 

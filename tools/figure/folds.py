@@ -304,11 +304,11 @@ def sew(name: str, garment: Garment) -> Garment:
 def _shirt_seams(p: Float64, tube: int) -> Float64:
     """Return (N,) metres from points (N, 3) to the nearest stitches of the shirt."""
     if tube:
-        return np.minimum(np.abs(length_inside_sleeve(p) - 0.018), np.abs(_beyond_armhole(p)))
+        return np.minimum(np.abs(length_inside_sleeve(p) - 0.018), _from_armhole(p))
     lines = (
         np.abs(depth_below_collar(p) - 0.016),
         np.abs(p[:, 1] - HEM - 0.020),
-        np.abs(_beyond_armhole(p)),
+        _from_armhole(p),
     )
     return np.min(lines, axis=0)
 
@@ -321,9 +321,13 @@ def _from_pocket(p: Float64) -> Float64:
     return np.where(p[:, 2] < -0.03, np.abs(np.maximum(across - wide, down - high)), 1.0)
 
 
-def _beyond_armhole(p: Float64) -> Float64:
-    """Return (N,) metres from the armhole outwards; far where points (N, 3) are below or above its seam."""
-    return np.where((p[:, 1] > 1.29) & (p[:, 1] < 1.405), np.abs(p[:, 0]) - ARMHOLE, 1.0)
+def _from_armhole(p: Float64) -> Float64:
+    """Return (N,) metres from the armhole; far where points (N, 3) are below or above its seam.
+
+    The seam fades towards the shoulder, where the picture is stretched.
+    """
+    faded = 0.01 * smoothstep((p[:, 1] - 1.335) / 0.03)
+    return np.where((p[:, 1] > 1.29) & (p[:, 1] < 1.405), np.abs(np.abs(p[:, 0]) - ARMHOLE) + faded, 1.0)
 
 
 def _trouser_seams(p: Float64, tube: int) -> Float64:

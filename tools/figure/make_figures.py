@@ -7,8 +7,10 @@ To be run after each change of `head.glb` (`make_head.py` does) or `body.glb` (`
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
+import arms
 import make_baked
 import make_head
 import numpy as np
@@ -27,6 +29,7 @@ from fba.parameters import faps
 
 BUILTIN = Path(__file__).parents[2] / "fba"
 ROUNDS = 8
+LIMB = ("shoulder", "elbow", "wrist")
 
 
 def make_figure(looks: Looks) -> dict[str, np.ndarray]:
@@ -40,7 +43,7 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
     assert skin.material.texture is not None
     assert eye.colours is not None
     offset = ORIGIN + np.array([0.0, figure.EYE_LEVEL, 0.0])
-    moved = reshape(looks, body.vertices - offset) + offset
+    moved = reshape(looks, slim_arms(looks, body) - offset) + offset
     tints = {"shirt": looks.shirt, "trousers": looks.trousers, "shoes": looks.shoes}
     tints["skin"] = tints["neck"] = linear(looks.neck) / linear(ALEX.neck)
     tints["hair"] = np.mean([linear(c) for c in looks.hair.colours], axis=0) / np.mean(
@@ -60,6 +63,42 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
         "body_moves": steps(moved - body.vertices),
         "body_tints": np.array([tints[part.name] for part in body.parts], np.float32),
     }
+
+
+def slim_arms(looks: Looks, body: BodyModel) -> Float64:
+    """Return the first figure's body (V, 3) with the girth and the muscles of another's arms."""
+    names, moved = body.skeleton, body.vertices.astype(np.float64)
+    standing = np.tile(np.eye(4), (len(names), 1, 1))
+    standing[:, :3, 3] = names.centres
+    hanging = body.skin(standing)
+    left = names.centres[[names.number(f"l_{joint}") for joint in LIMB]]
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        joints = [names.number(f"{side}_{joint}") for joint in LIMB]
+        arm, _, hand = (carried_share(body, joint) for joint in joints)
+        share = (arm - hand)[:, None]
+        mirrored = hanging * (sign, 1.0, 1.0)
+        _, _, outward = arms.arm_place(mirrored, left)
+        height = (arms.shape_arm(mirrored, left, arm > 0) * outward).sum(axis=1, keepdims=True)
+        moved -= share * (1 - looks.muscles) * height * body.normals
+        bone = nearest(body.vertices, body.bind[joints, :3, 3])
+        moved += share * (1 - looks.girth) * (bone - body.vertices)
+    return moved
+
+
+def carried_share(body: BodyModel, joint: int) -> Float64:
+    """Return (V,) weight with which a joint and those below it carry each vertex."""
+    below = np.isin(body.joints, body.skeleton.descendants(joint))
+    return (body.weights * below).sum(axis=1, dtype=np.float64)
+
+
+def nearest(points: Float32, line: Float64) -> Float64:
+    """Return the points (N, 3) of a line through corners (K, 3) that are nearest to points (N, 3)."""
+    found = []
+    for start, end in pairwise(line):
+        along = np.clip((points - start) @ (end - start) / ((end - start) ** 2).sum(), 0, 1)
+        found.append(start + along[:, None] * (end - start))
+    away = [np.linalg.norm(points - each, axis=1) for each in found]
+    return np.asarray(np.stack(found)[np.argmin(away, axis=0), np.arange(len(points))])
 
 
 def steps(moves: Float64) -> np.ndarray:

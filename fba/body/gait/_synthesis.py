@@ -33,6 +33,8 @@ _MORE_CURL = {"index": 0.85, "middle": 0.95, "ring": 1.1, "pinky": 1.2}
 """Factors of the curl of each finger: a hand at rest closes towards the little finger."""
 _JOINT_CURL = {1: 0.75, 2: 1.4, 3: 0.85}
 """Factors of the curl of the joints along a finger: the middle one bends most."""
+_GIRDLE = 0.7
+"""Turn of the shoulder girdles relative to that of the chest, which they continue."""
 _LATE = 0.02
 """Fraction of the cycle by which arms lag behind the legs."""
 _REACH = 0.995
@@ -201,7 +203,7 @@ def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64
         girdle = f"{letter}_sternoclavicular"
         if girdle in skeleton:
             writer.turn(girdle, 2, sign * np.radians(arms.up) * constant)
-            writer.turn(girdle, 1, -sign * np.radians(arms.forward) * constant)
+            writer.turn(girdle, 1, _GIRDLE * turn - sign * np.radians(arms.forward) * constant)
         curl = np.radians(arms.curl) * constant
         for number in (1, 2, 3):
             for finger in FINGERS:

@@ -261,8 +261,9 @@ def body_shape(part: BodyPart, joints: int, stored: dict[str, Any]) -> FaceShape
     carried = np.einsum("vk,vkn->vn", part.weights, random[part.joints]) * WEIGHT_SCALE
     open_surface = part.material.two_sided
     return replace(
-        shape, scatter=float(part.kind in SCATTERING_KINDS), two_sided=open_surface, closed=not open_surface,
-        name="", coarser=detail_levels(part, carried.astype(np.float32), stored), casts=True,
+        shape, scatter=float(part.kind in SCATTERING_KINDS), folds=bool(stored) and part.kind == "cloth",
+        two_sided=open_surface, closed=not open_surface, name="",
+        coarser=detail_levels(part, carried.astype(np.float32), stored), casts=True,
     )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ TEXELS = 256
 """Texels along each side of the maps that the sky and the key light see."""
 HALVINGS = 5
 """How often the maps are halved."""
-CELLS, NEAR_CELLS = 64, 48
+CELLS, NEAR_CELLS = 64, 56
 """Texels of the darkness along each side, of all the ground and of that near feet."""
 FRAMED = 0.25
 """Metres: in steps of these, the map that the key light sees is larger than what throws shadows."""
@@ -41,7 +41,7 @@ COARSE = 2.4
 """Shadows are cast coarsely on ground that is wider than this, in multiples of `WIDTH`."""
 MAX_COARSE_ERROR = TOLERANCES[-2]
 """Largest error (m) of what casts the shadow of one body among several."""
-CONTACT = 1.12
+CONTACT = 1.3
 """Metres, along each side, of the ground that is looked at finely around feet; twice that in long steps."""
 BEYOND = 0.5
 """Metres by which it is wider than the feet are apart, at least."""

@@ -168,6 +168,7 @@ class FaceRenderer:
                 ("SMOOTH", shape.smooth),
                 ("HAIRS", shape.across is not None),
                 ("LIMBS", mesh.limbs is not None),
+                ("FOLDS", mesh.limbs is not None and picture is not None and shape.folds),
                 ("SHADED", self._shade is not None),
                 ("FINELY", self._shade is not None and self._shade.finely),
                 ("TEXTURED", picture is not None),

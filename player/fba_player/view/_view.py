@@ -78,7 +78,7 @@ class FaceShape:
     simplified further for the shadow of one of several bodies; None to leave it as it is. smooth: False if
     triangles are so large that light changes visibly within them. wrinkle_places: float32 (V, 2), where each
     vertex lies in `fba_player._mesh.wrinkle_map`, None for a part without wrinkles. alpha, opacity, cutoff:
-    as of `fba.mesh._meshes.Material`.
+    as of `fba.mesh._meshes.Material`. folds: whether folds in its picture grow where joints of a body bend.
     """
 
     triangles: Int32
@@ -103,6 +103,7 @@ class FaceShape:
     alpha: Alpha = "auto"
     opacity: float = 1.0
     cutoff: float = 0.5
+    folds: bool = False
 
     @property
     def looks(self) -> Float32:

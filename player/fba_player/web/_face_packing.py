@@ -152,6 +152,8 @@ def _pack_shape(container: Container, shape: FaceShape | None, rows: Int64) -> d
         "opaque": shape.picture is None or shape.picture.opaque,
         "fine": rounded(shape.fine),
     }
+    if shape.folds:
+        header["folds"] = True
     if shape.across is not None:
         across = shape.across[rows].astype(np.float64)
         header["across"] = container.add_fractions(np.delete(across, 3, axis=1), HAIR_STEP)

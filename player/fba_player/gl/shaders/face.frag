@@ -24,6 +24,10 @@ const vec3 DARKENS = vec3(0.50, 0.58, 0.60); // light in a groove comes through 
 centroid in vec2 wrinkle_place;
 centroid in vec4 wrinkles;
 #endif
+#ifdef FOLDS
+const float FLAT = 0.60;   // linear light of flat cloth in its picture, as in tools/figure/folds.py
+centroid in float folded;
+#endif
 centroid in vec4 upright;
 centroid in vec4 coordinates;
 #ifdef SMOOTH
@@ -50,6 +54,9 @@ void main() {
     texel.rgb /= max(texel.a, 0.004); // colours of pictures with holes are multiplied by their alpha
 #endif
     albedo = texel.rgb * texel.rgb;
+#ifdef FOLDS
+    albedo = max(albedo + folded * (albedo - FLAT), 0.15);
+#endif
 #endif
 #if defined(CUT) || defined(VEIL)
     opaque *= opacity;

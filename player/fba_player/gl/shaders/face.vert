@@ -1,8 +1,9 @@
 #version 330 core
 // Parts of faces and bodies. Preprocessor options: SMOOTH computes light for each vertex; HAIRS; TEXTURED
-// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds a relief; LIMBS lets a body's limbs keep
-// the sky from each other; SHADED lets bodies throw shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where
-// it is low, VEIL blends by it and an opacity. Software OpenGL runs both branches of a
+// multiplies the colour by a picture; WRINKLED draws wrinkles; FINE adds a relief; LIMBS lets a body's limbs
+// keep the sky from each other; FOLDS makes the folds of its clothes grow where they bend; SHADED lets bodies
+// throw shadows on each other, FINELY for each pixel; SOLID ignores alpha, CUT makes holes where it is low,
+// VEIL blends by it and an opacity. Software OpenGL runs both branches of a
 // condition, so each combination of options is a program of its own.
 //
 // All that is passed on is `centroid`: many triangles of a small face are smaller than a pixel, and values at the
@@ -43,6 +44,9 @@ centroid out vec4 wrinkles;
 #ifdef LIMBS
 uniform vec4 limbs[24]; // both ends of each, and its radius
 #endif
+#ifdef FOLDS
+centroid out float folded;       // how much deeper than in the picture folds are
+#endif
 #ifdef HAIRS
 in vec4 in_across;      // of hairs: from the opposite vertex to this one, and half the width; else 0, 0, 0, 1
 in vec4 in_along;       // of hairs: direction to the tip, and which of the two sides this is
@@ -77,6 +81,31 @@ float past_limbs(vec3 at, vec3 n) {
         if (towards > 0.0) past *= 1.0 - min(min(radius * radius * per, 1.0) * 1.4 * towards * sqrt(per), 0.9);
     }
     return past;
+}
+#endif
+
+#ifdef FOLDS
+// How much deeper folds are near a joint that is so far away. bend: from the direction of the limb above it
+// to that of the limb below. On the inside of the bend they grow; elsewhere cloth is smooth.
+float bent(vec3 away, vec3 bend) {
+    return max(1.0 - 17.0 * dot(away, away), 0.0) * (20.0 * dot(away, bend) - 0.35);
+}
+
+// Limbs have the order of `CAPSULES` in `fba_player._figure.body_light`, and about the lengths of the
+// library's figures.
+float folds(vec3 at) {
+    vec3 trunk = (limbs[0].xyz - limbs[1].xyz) * 2.5;
+    vec3 hips = (limbs[16].xyz - limbs[18].xyz) * 5.2, shoulders = (limbs[4].xyz - limbs[6].xyz) * 2.7;
+    vec3 waist = at - limbs[0].xyz;
+    float leans = 0.5 * dot(shoulders - hips, trunk), turns = 8.0 * length(cross(hips, shoulders));
+    float deeper = bent(waist, leans * hips + turns * waist);
+    for (int k = 0; k < 4; k += 2) {
+        vec3 arm = limbs[k + 4].xyz, hip = limbs[k + 16].xyz, knee = limbs[k + 20].xyz;
+        vec3 thigh = (knee - hip) * 2.3;
+        deeper += bent(at - arm, (limbs[k + 5].xyz - arm) * 3.5 - trunk) + bent(at - hip, thigh - trunk)
+            + bent(at - knee, (limbs[k + 21].xyz - knee) * 2.4 - thigh);
+    }
+    return clamp(deeper, -0.7, 0.8);
 }
 #endif
 
@@ -128,6 +157,9 @@ void main() {
 #ifndef FINELY
     reach.x *= unshaded(before);
 #endif
+#endif
+#ifdef FOLDS
+    folded = folds(at);
 #endif
 #ifdef WRINKLED
     wrinkle_place = in_wrinkle;

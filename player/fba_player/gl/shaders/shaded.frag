@@ -13,7 +13,7 @@ uniform vec2 corner;            // x and z of the corner of this piece
 uniform float size;             // its metres
 const float KEY_REACH = 0.16;   // metres: what is further away is softer than the coarser map
 const float SOFTEST = 0.02;
-const float CELLS = 48.0;
+const float CELLS = 56.0;
 const float TOUCHING = 0.022;   // metres: height of a sole's edge above the ground
 #else
 const float KEY_REACH = 0.45;   // metres
@@ -73,7 +73,9 @@ void main() {
 #ifdef CONTACT
         rise = max((1.0 - seen.y / max(seen.x, 1e-4)) * HIGHEST, TOUCHING);
         apart = rise * rise + away;
-        hides = 0.7 * hides + 0.9 * rise * rise / (apart * apart);
+        // The dark line along a sole belongs to what touches the ground: a raised toe has none.
+        float touches = min(4.0 * TOUCHING * TOUCHING / (rise * rise), 1.0);
+        hides = 0.7 * hides + 1.1 * touches * touches * rise * rise / (apart * apart);
 #endif
         sky += seen.x * area * hides;
         vec2 before = along_key(ground + spiral(k, 0.5) * KEY_REACH, 0.2 * KEY_REACH * KEY_REACH);

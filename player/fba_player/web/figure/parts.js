@@ -9,13 +9,13 @@ import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.
  * outside. leaders: for each vertex the first that shares its normal. colour: linear light. gloss: 1 - roughness. colours: linear light, three numbers each, glosses: one each, or
  * null where all vertices have `colour` and `gloss`. texture: bytes of a picture in sRGB that multiplies the colours, or
  * null. texcoords: two numbers each, from the picture's top left. alpha: what texture's alpha and opacity mean, as in
- * `fba.mesh.Material`. across: of single hairs, eight numbers each; scatter, closed, smooth, opaque: as in `FaceShape` of the
+ * `fba.mesh.Material`. across: of single hairs, eight numbers each; scatter, folds, closed, smooth, opaque: as in `FaceShape` of the
  * desktop player, which says what shaders take. fine: strength and repetitions of the skin's relief. ball: whether it is an eyeball, which has a shader of its own.
  * @typedef {{
  *   name: string, kind: string, first: number, count: number, positions: Float32Array, normals: Float32Array,
  *   triangles: Uint32Array, leaders: Uint32Array, colour: Float64Array, gloss: number, colours: Float32Array | null, glosses: Float32Array | null,
  *   texture: Uint8Array | null, texcoords: Float32Array | null, opacity: number, alpha: string, cutoff: number,
- *   twoSided: boolean, across: Float32Array | null, scatter: number, closed: boolean, smooth: boolean, opaque: boolean,
+ *   twoSided: boolean, across: Float32Array | null, scatter: number, folds: boolean, closed: boolean, smooth: boolean, opaque: boolean,
  *   fine: number[], ball: boolean,
  * }} Part
  */
@@ -73,6 +73,7 @@ function surface(container, entry, count, what) {
     twoSided: entry.twoSided === true,
     across: entry.across === undefined ? null : hairs(container, entry, count, what),
     scatter: checkedNumber(entry.scatter ?? 0, `the scattering of ${what}`),
+    folds: entry.folds === true,
     closed: entry.closed === true,
     smooth: entry.smooth === true,
     opaque: entry.opaque !== false,

@@ -233,10 +233,10 @@ function shapeOf(parts, count, pictureOf) {
     }
     if (part.texcoords) texcoords?.set(part.texcoords, 2 * part.first);
     if (part.across) across?.set(part.across, 8 * part.first);
-    const { kind, scatter, closed, smooth, twoSided, opaque, alpha, opacity, cutoff, fine, ball } = part;
+    const { kind, scatter, folds, closed, smooth, twoSided, opaque, alpha, opacity, cutoff, fine, ball } = part;
     if (!ball) {
       const picture = part.texcoords ? pictureOf(place) : null;
-      drawn.push({ first: corners, count: part.triangles.length, picture, opaque, scatter, twoSided, closed, hairs: part.across !== null, smooth, alpha, opacity, cutoff, fine, wrinkled: kind === "skin" });
+      drawn.push({ first: corners, count: part.triangles.length, picture, opaque, scatter, folds, twoSided, closed, hairs: part.across !== null, smooth, alpha, opacity, cutoff, fine, wrinkled: kind === "skin" });
       for (let at = 0; at < part.triangles.length; at += 1, corners += 1) triangles[corners] = part.triangles[at] + part.first;
     }
   }

@@ -14,7 +14,7 @@ import { IDENTITY, invert, rotationOf } from "../figure/matrices.js";
  * A part of a figure: its triangles are indices `first` to `first + count` of the figure's; the rest as of `FaceShape` of
  * the desktop player.
  * @typedef {{
- *   first: number, count: number, picture: ImageBitmap | null, opaque: boolean, scatter: number, twoSided: boolean,
+ *   first: number, count: number, picture: ImageBitmap | null, opaque: boolean, scatter: number, folds: boolean, twoSided: boolean,
  *   closed: boolean, hairs: boolean, smooth: boolean, alpha: string, opacity: number, cutoff: number, wrinkled: boolean,
  *   fine: number[],
  * }} Part
@@ -273,6 +273,7 @@ function optionsOf(part, { limbs = false, wrinkled = false, fine = false, core =
     SMOOTH: part.smooth,
     HAIRS: part.hairs,
     LIMBS: limbs,
+    FOLDS: limbs && part.folds && part.picture,
     TEXTURED: part.picture,
     WRINKLED: wrinkled,
     FINE: fine,
