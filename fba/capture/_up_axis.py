@@ -160,8 +160,8 @@ def _find_floors(source: MappedMotion) -> dict[str, _Floor]:
         room = TUNING.max_off_centre * size
         above = ((centre < ends[0].max(axis=1) + room) & (centre > ends[1].min(axis=1) - room)).all(axis=1)
         shares = float(touched.mean()), float((touched & above).mean())
-        often = [share >= TUNING.min_carried_share for share in shares]
-        result[name] = _Floor(*often, at_zero=abs(level) < TUNING.max_floor_distance * size)
+        rested, carried = (share >= TUNING.min_carried_share for share in shares)
+        result[name] = _Floor(rested, carried, abs(level) < TUNING.max_floor_distance * size)
     return result
 
 
