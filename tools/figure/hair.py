@@ -26,21 +26,23 @@ TOP = (0.0, 0.95)
 """Slopes of the head, as the sine of the angle, between which the hair reaches the thickness of the top."""
 CALM = (0.080, 0.098)
 """Heights of the skin between which locks cease to stand out, metres."""
-PARTING = np.array([[0.034, 0.071, 0.000], [0.012, 0.106, -0.135]])
-"""Ends of the parting, on the subject's left, from the hairline to the crown; all strands lead away from it,
-metres."""
+PARTING = np.array([[0.040, 0.045, 0.008], [0.012, 0.106, -0.135]])
+"""Ends of the parting, on the subject's left, from the forehead to the crown; all strands lead away from it,
+metres. Before the hairline it is not seen, but strands at the hairline lead across, not all ways."""
 TONES = (-0.85, -0.30, 0.35, 1.0)
 """How bright hair is where it has each of its colours."""
 RADIUS = 0.1
 """Of the ball onto which places on the scalp are carried for their strands, metres."""
 VOLUMES = (
     # a place on the left, and how far around it, metres
-    ((0.0, 0.090, -0.020), (0.055, 0.030, 0.030)),
+    ((0.0, 0.090, -0.025), (0.065, 0.040, 0.045)),
     ((0.0, 0.030, -0.185), (0.060, 0.045, 0.040)),
 )  # fmt: skip
 """Where hair is thicker than elsewhere: above the forehead, behind."""
 DEEPEST = -0.008
 """Least thickness: the skull is flatter at its corners than hair lets it look, metres."""
+NEIGHBOURS, EVENED, EDGE = 80, 0.014, 0.014
+"""Vertices, and metres around, over which the thickness is averaged; metres over which it begins."""
 EARS = (0.0785, 0.0085)
 """Farther from the middle, and lower, than this (m) there are ears, which have no hair."""
 AXIS = -0.085
@@ -59,11 +61,11 @@ CROPPED = (
     ((0.076, -0.016, -0.066), (0.020, 0.022, 0.016), 1.4),
 )
 """Where hair is cropped ever shorter towards its edge: the nape and the sideburn."""
-STRANDS, SEGMENTS = 10, 6
+STRANDS, SEGMENTS = 16, 6
 """Of each lock, and straight pieces of each strand."""
-WIDTH = 0.0006
+WIDTH = 0.0004
 """Of a strand, metres."""
-PROFILES = np.array([[-0.22, -0.08, 0.0, 0.06, 0.12, 0.16], [-0.42, 0.0, 0.25, 0.25, 0.0, -0.42]])
+PROFILES = np.array([[-0.14, -0.04, 0.03, 0.06, 0.04, -0.02], [-0.42, 0.0, 0.25, 0.25, 0.0, -0.42]])
 """How much brighter a strand is from its root to its tip: of straight and of curly hair."""
 DARKEST, BRIGHTEST = -1.4, 1.4
 """Tones at the ends of what a picture holds."""
@@ -109,12 +111,21 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
     full = full + lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
     # Before the ears hair lies close to the head.
     ahead = smoothstep((folded[:, 2] + 0.135) / 0.05) * (1 - smoothstep((folded[:, 1] + 0.015) / 0.085))
-    full = full * (1 - 0.8 * ahead)
-    # Locks end in a rounded edge, but hair of the temples and the nape grows thinner downwards.
+    full = np.maximum(full * (1 - 0.8 * ahead), DEEPEST)
+    # Hair of the temples and the nape grows thinner downwards.
     low = smoothstep((0.06 - folded[:, 1]) / 0.05)
     share = np.clip(above / (hair.rise * (1 + 2 * low)), 0.0, 1.0)
-    share = (share * (2 - share)) ** (0.6 + 0.4 * low) * smoothstep((above - 0.005) / 0.010)
-    return vertices + unit(vertices - MIDDLE) * (share * np.maximum(full, DEEPEST))[:, None]
+    thick = _evened(vertices, above, full * share * (2 - share)) * smoothstep((above - 0.001) / EDGE)
+    return vertices + unit(vertices - MIDDLE) * thick[:, None]
+
+
+def _evened(vertices: Float64, above: Float64, thick: Float64) -> Float64:
+    """Return thicknesses (V,) averaged with those around: on bumps and steep edges strands would look like
+    the grain of wood, which is cut likewise. above: (V,), heights above the hairline."""
+    free = np.flatnonzero(above > -0.5)  # not ears
+    apart, near = cKDTree(vertices[free]).query(vertices, k=NEIGHBOURS)
+    share = np.exp(-((apart / EVENED) ** 2)) + 1e-9
+    return (share * thick[free][near]).sum(axis=1) / share.sum(axis=1)
 
 
 def _roundness(vertices: Float64, scalp: Bool) -> Float64:
@@ -154,9 +165,10 @@ def painted_height(positions: Float64, grown: Float64, hair: Hair) -> Float64:
     # Along the parting, which ends softly on the crown, there is scalp as well.
     places = strand_places(grown)
     away = places.real * _metres(places) + 0.0012 * noise(positions, 0.004, 67)
-    crossed = 0.006 * np.maximum(noise(positions, 0.006, 68), 0.0)  # by strands of the other side
+    crossed = 0.005 * np.maximum(noise(positions, 0.006, 68), 0.0)  # by strands of the other side
     behind = 0.010 * smoothstep((0.95 - np.cos(places.imag)) / 0.7)
-    return np.minimum(height, 0.008 + crossed + behind + 6 * np.maximum(away, 0.0))
+    before = 0.012 * (1 - smoothstep((height - 0.004) / 0.014))  # no notch in the hairline
+    return np.minimum(height, 0.004 + crossed + behind + before + 6 * np.maximum(away, 0.0))
 
 
 def _cropped(positions: Float64) -> Float64:
@@ -275,10 +287,10 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
         bend = uniform(3.5, 6.5, count) * random.choice((-1, 1), count)
         order = tone = 0.7 * tone + 0.12 * noise(places, 0.007, 64)
     else:
-        length = (0.005 + full * (0.011 + 0.022 * long)) * uniform(0.7, 1.2, count)
+        length = (0.005 + full * (0.014 + 0.030 * long)) * uniform(0.7, 1.2, count)
         length /= 1 + 0.5 * _cropped(places)
         width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
-        heading, bend = normal(0, 0.07, count), normal(0, 0.10, count) + 0.25 * noise(places, 0.020, 62)
+        heading, bend = normal(0, 0.05, count), normal(0, 0.08, count) + 0.12 * noise(places, 0.030, 62)
         tone += 0.3 * (1 - full)
         order = -roots.real * (1 + 0.06 * normal(size=count))
     order = np.argsort(order)
@@ -295,7 +307,7 @@ def _draw_locks(locks: Locks, hair: Hair) -> tuple[Float64, Float64]:
     each = np.repeat(np.arange(len(locks.roots)), STRANDS)
     full, length = locks.fullness[each], locks.lengths[each] * random.uniform(0.65, 1.1, len(each))
     across = random.uniform(-1, 1, len(each))
-    tone = locks.tones[each] - 0.35 * across**2 + random.normal(0, 0.22, len(each))
+    tone = locks.tones[each] - 0.22 * across**2 + random.normal(0, 0.26, len(each))
     path, widths, at = [], [], locks.roots[each]
     at = at + (1 - full) * random.uniform(-0.006, 0.006, len(each)) / _metres(at)
     side = 1j * across * locks.widths[each] / 2
