@@ -29,6 +29,8 @@ CALM = (0.080, 0.098)
 PARTING = np.array([[0.040, 0.045, 0.008], [0.012, 0.106, -0.135]])
 """Ends of the parting, on the subject's left, from the forehead to the crown; all strands lead away from it,
 metres. Before the hairline it is not seen, but strands at the hairline lead across, not all ways."""
+PARTED = 0.0009
+"""Half the width of the parting, metres."""
 TONES = (-0.85, -0.30, 0.35, 1.0)
 """How bright hair is where it has each of its colours."""
 RADIUS = 0.1
@@ -49,16 +51,16 @@ AXIS = -0.085
 """z of the vertical axis around which the angles of the hairline are measured."""
 
 
-LOCKS = (9000, 9000)
+LOCKS = (11000, 9000)
 """How many locks of straight and of curly hair are painted."""
 RAGGED = (0.0012, 0.0024)
 """How far, metres, the painted hairline of straight and of curly hair wanders."""
-THINNING = 0.016
+THINNING = 0.012
 """Metres above the hairline over which hair becomes full."""
 CROPPED = (
     # a place on the left, how far around it, metres; how much
     ((0.0, -0.048, -0.185), (0.075, 0.035, 0.075), 2.4),
-    ((0.076, -0.016, -0.066), (0.020, 0.022, 0.016), 1.4),
+    ((0.076, -0.020, -0.066), (0.020, 0.028, 0.018), 2.6),
 )
 """Where hair is cropped ever shorter towards its edge: the nape and the sideburn."""
 STRANDS, SEGMENTS = 16, 6
@@ -152,23 +154,14 @@ def height_above_hairline(positions: Float64) -> Float64:
     return np.where(ears, -1.0, above)
 
 
-def painted_height(positions: Float64, grown: Float64, hair: Hair) -> Float64:
+def painted_height(positions: Float64, hair: Hair) -> Float64:
     """Return (N,) heights above the hairline as hair is painted: less where it is cropped, and irregular.
 
-    positions, grown: (N, 3), of the skin, and with the layer of hair.
+    positions: (N, 3), of the skin.
     """
     ragged = RAGGED[int(hair.curly)] * (noise(positions, 0.011, 71) + 0.7 * noise(positions, 0.004, 72))
     above = height_above_hairline(positions)
-    height = np.where(above > -0.5, (above + ragged) / (1 + _cropped(positions)), above)
-    if hair.curly:
-        return height
-    # Along the parting, which ends softly on the crown, there is scalp as well.
-    places = strand_places(grown)
-    away = places.real * _metres(places) + 0.0012 * noise(positions, 0.004, 67)
-    crossed = 0.005 * np.maximum(noise(positions, 0.006, 68), 0.0)  # by strands of the other side
-    behind = 0.010 * smoothstep((0.95 - np.cos(places.imag)) / 0.7)
-    before = 0.012 * (1 - smoothstep((height - 0.004) / 0.014))  # no notch in the hairline
-    return np.minimum(height, 0.004 + crossed + behind + before + 6 * np.maximum(away, 0.0))
+    return np.where(above > -0.5, (above + ragged) / (1 + _cropped(positions)), above)
 
 
 def _cropped(positions: Float64) -> Float64:
@@ -232,15 +225,29 @@ def paint_locks(p: Float64, step: Float64, above: Float64, hair: Hair) -> tuple[
     # Between strands one sees deep into full hair, but the skin where it is sparse.
     gaps = (1 - cover) * smoothstep((above - 0.002) / THINNING)
     cover = cover + gaps
+    if not hair.curly:
+        cover = cover * (1 - _parted(p, above))
     # Single hairs at the edge are finer than a texel.
     thin = 0.55 + 0.45 * smoothstep(above / THINNING)
     places = strand_places(p)
-    deep = DEEP[int(hair.curly)] * (1 if hair.curly else smoothstep(places.real * _metres(places) / 0.006))
-    tone = (drawn + gaps * deep) / np.maximum(cover, 0.02)
+    tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
     if not hair.curly:
         bright = shine(unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69))
-        tone = tone * (1 + 0.2 * bright) + 0.32 * bright
+        tone = tone * (1 + 0.5 * bright) + 0.36 * bright
+        # Beside the parting hair rises out of the shade.
+        away = places.real * _metres(places)
+        tone += 0.16 * np.exp(-(((away - 0.015) / 0.009) ** 2)) - 0.25 * np.exp(-((away / 0.003) ** 2))
     return tone, np.where(above < -0.5, 0.0, cover * thin)
+
+
+def _parted(p: Float64, above: Float64) -> Float64:
+    """Return (N,) how much of the scalp is seen at points (N, 3): along the parting, which ends softly at
+    the hairline and on the crown. above: (N,), heights above the hairline."""
+    places = strand_places(p)
+    away = places.real * _metres(places) + 0.0004 * noise(p, 0.003, 67)
+    crossed = 0.75 - 0.35 * noise(p, 0.006, 68)  # by strands of the other side
+    ends = smoothstep((np.cos(places.imag) + 0.75) / 0.7) * smoothstep((above - 0.004) / 0.012)
+    return crossed * ends * np.exp(-((np.maximum(away, 0.0) / PARTED) ** 2))
 
 
 def shine(rise: Float64) -> Float64:
@@ -259,7 +266,7 @@ def _look_up(picture: tuple[Float64, Float64], p: Float64) -> tuple[Float64, Flo
 def _metres(places: Complex128) -> Float64:
     """Return (N,) how many metres of the head a unit of `strand_places` is, the same in all directions."""
     focus = _map_axes()[3]
-    steep = np.maximum(np.abs(np.sinh(places)), 0.03)
+    steep = np.maximum(np.abs(np.sinh(places)), 0.15)
     return 2 * RADIUS * focus * steep / (1 + np.abs(focus * np.cosh(places)) ** 2)
 
 
@@ -290,9 +297,12 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
         length = (0.005 + full * (0.014 + 0.030 * long)) * uniform(0.7, 1.2, count)
         length /= 1 + 0.5 * _cropped(places)
         width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
-        heading, bend = normal(0, 0.05, count), normal(0, 0.08, count) + 0.12 * noise(places, 0.030, 62)
+        heading, bend = normal(0, 1, count) * (0.05 + 0.25 * (1 - full)), normal(0, 0.08, count) + 0.12 * noise(places, 0.030, 62)
         tone += 0.3 * (1 - full)
         order = -roots.real * (1 + 0.06 * normal(size=count))
+        # Where they grew from before the parting, they begin there.
+        first = uniform(0.0, 0.0010, count) / _metres(roots)
+        roots = np.maximum(roots.real - 0.5 * length / _metres(roots), first) + 1j * roots.imag
     order = np.argsort(order)
     return Locks(*(values[order] for values in (roots, length, width, heading, bend, tone, full)))
 
