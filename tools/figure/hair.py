@@ -29,8 +29,8 @@ CALM = (0.080, 0.098)
 PARTING = np.array([[0.040, 0.045, 0.008], [0.012, 0.106, -0.135]])
 """Ends of the parting, on the subject's left, from the forehead to the crown; all strands lead away from it,
 metres. Before the hairline it is not seen, but strands at the hairline lead across, not all ways."""
-PARTED = 0.0009
-"""Half the width of the parting, metres."""
+PARTED, MIXED = 0.0009, 0.0020
+"""Half the width of the parting, and how far from it strands of both sides cross, metres."""
 TONES = (-0.85, -0.30, 0.35, 1.0)
 """How bright hair is where it has each of its colours."""
 RADIUS = 0.1
@@ -71,7 +71,7 @@ PROFILES = np.array([[-0.14, -0.04, 0.03, 0.06, 0.04, -0.02], [-0.42, 0.0, 0.25,
 """How much brighter a strand is from its root to its tip: of straight and of curly hair."""
 DARKEST, BRIGHTEST = -1.4, 1.4
 """Tones at the ends of what a picture holds."""
-DEEP = (-0.7, -0.62)
+DEEP = (-0.5, -0.62)
 """Tones between strands of straight and of curly hair."""
 REACH, SCALE, SOFT = 3.25, 900, 2.0
 """Extent of `strand_places` away from the parting; pixels to a unit of them; pixels of blur."""
@@ -258,8 +258,13 @@ def shine(rise: Float64) -> Float64:
 def _look_up(picture: tuple[Float64, Float64], p: Float64) -> tuple[Float64, Float64]:
     """Return (N,) what the two pictures of `_draw_locks` hold at points (N, 3)."""
     places = strand_places(p)
-    at = np.stack([places.real, places.imag + np.pi]) * SCALE
-    drawn, cover = (map_coordinates(values, at, order=1) for values in picture)
+    # At the parting, where the pictures' edges meet, both sides are mixed.
+    across = 0.5 * np.exp(-((places.real * _metres(places) / MIXED) ** 2))
+    drawn, cover = np.zeros(len(p)), np.zeros(len(p))
+    for share, along in ((1 - across, places.imag), (across, -places.imag)):
+        at = np.stack([places.real, along + np.pi]) * SCALE
+        drawn += share * map_coordinates(picture[0], at, order=1)
+        cover += share * map_coordinates(picture[1], at, order=1)
     return drawn, cover
 
 
@@ -294,7 +299,7 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
         bend = uniform(3.5, 6.5, count) * random.choice((-1, 1), count)
         order = tone = 0.7 * tone + 0.12 * noise(places, 0.007, 64)
     else:
-        length = (0.005 + full * (0.014 + 0.030 * long)) * uniform(0.7, 1.2, count)
+        length = (0.005 + full * (0.020 + 0.026 * long)) * uniform(0.7, 1.2, count)
         length /= 1 + 0.5 * _cropped(places)
         width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
         heading, bend = normal(0, 1, count) * (0.05 + 0.25 * (1 - full)), normal(0, 0.08, count) + 0.12 * noise(places, 0.030, 62)
