@@ -59,7 +59,7 @@ THINNING = 0.012
 """Metres above the hairline over which hair becomes full."""
 CROPPED = (
     # a place on the left, how far around it, metres; how much
-    ((0.0, -0.048, -0.185), (0.075, 0.035, 0.075), 2.4),
+    ((0.0, -0.050, -0.185), (0.085, 0.042, 0.075), 2.8),
     ((0.076, -0.020, -0.066), (0.020, 0.028, 0.018), 2.6),
 )
 """Where hair is cropped ever shorter towards its edge: the nape and the sideburn."""
@@ -110,14 +110,15 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
         full = full + more * np.exp(-(((folded - place) / reach) ** 2).sum(axis=1))
     # Not on the crown, whose highest point is a feature point.
     lumps = hair.lumps * (1 - smoothstep((folded[:, 1] - CALM[0]) / (CALM[1] - CALM[0])))
-    full = full + lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
+    lumps = lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
     # Before the ears hair lies close to the head.
     ahead = smoothstep((folded[:, 2] + 0.135) / 0.05) * (1 - smoothstep((folded[:, 1] + 0.015) / 0.085))
     full = np.maximum(full * (1 - 0.8 * ahead), DEEPEST)
     # Hair of the temples and the nape grows thinner downwards.
     low = smoothstep((0.06 - folded[:, 1]) / 0.05)
     share = np.clip(above / (hair.rise * (1 + 2 * low)), 0.0, 1.0)
-    thick = _evened(vertices, above, full * share * (2 - share)) * smoothstep((above - 0.001) / EDGE)
+    share = share * (2 - share)
+    thick = (_evened(vertices, above, full * share) + lumps * share) * smoothstep((above - 0.001) / EDGE)
     return vertices + unit(vertices - MIDDLE) * thick[:, None]
 
 
@@ -226,28 +227,31 @@ def paint_locks(p: Float64, step: Float64, above: Float64, hair: Hair) -> tuple[
     gaps = (1 - cover) * smoothstep((above - 0.002) / THINNING)
     cover = cover + gaps
     if not hair.curly:
-        cover = cover * (1 - _parted(p, above))
+        parted, beside = _parting(p, above)
+        cover = cover * (1 - parted)
     # Single hairs at the edge are finer than a texel.
     thin = 0.55 + 0.45 * smoothstep(above / THINNING)
     places = strand_places(p)
     tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
     if not hair.curly:
         bright = shine(unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69))
-        tone = tone * (1 + 0.5 * bright) + 0.36 * bright
-        # Beside the parting hair rises out of the shade.
-        away = places.real * _metres(places)
-        tone += 0.16 * np.exp(-(((away - 0.015) / 0.009) ** 2)) - 0.25 * np.exp(-((away / 0.003) ** 2))
+        tone = tone * (1 + 0.5 * bright) + 0.36 * bright + beside
     return tone, np.where(above < -0.5, 0.0, cover * thin)
 
 
-def _parted(p: Float64, above: Float64) -> Float64:
-    """Return (N,) how much of the scalp is seen at points (N, 3): along the parting, which ends softly at
-    the hairline and on the crown. above: (N,), heights above the hairline."""
+def _parting(p: Float64, above: Float64) -> tuple[Float64, Float64]:
+    """Return (N,) how much of the scalp is seen at points (N, 3), and (N,) how much brighter hair is there.
+
+    The parting ends softly at the hairline and on the crown. above: (N,), heights above the hairline.
+    """
     places = strand_places(p)
-    away = places.real * _metres(places) + 0.0004 * noise(p, 0.003, 67)
+    away = places.real * _metres(places)
+    line = np.maximum(away + 0.0004 * noise(p, 0.003, 67), 0.0)
     crossed = 0.75 - 0.35 * noise(p, 0.006, 68)  # by strands of the other side
     ends = smoothstep((np.cos(places.imag) + 0.75) / 0.7) * smoothstep((above - 0.004) / 0.012)
-    return crossed * ends * np.exp(-((np.maximum(away, 0.0) / PARTED) ** 2))
+    # Beside it hair rises out of the shade.
+    risen = 0.16 * np.exp(-(((away - 0.015) / 0.009) ** 2)) - 0.25 * np.exp(-((away / 0.003) ** 2))
+    return crossed * ends * np.exp(-((line / PARTED) ** 2)), ends * risen
 
 
 def shine(rise: Float64) -> Float64:
@@ -302,7 +306,10 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
         length = (0.005 + full * (0.020 + 0.026 * long)) * uniform(0.7, 1.2, count)
         length /= 1 + 0.5 * _cropped(places)
         width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
-        heading, bend = normal(0, 1, count) * (0.05 + 0.25 * (1 - full)), normal(0, 0.08, count) + 0.12 * noise(places, 0.030, 62)
+        heading, bend = (
+            normal(0, 1, count) * (0.05 + 0.25 * (1 - full)),
+            normal(0, 0.08, count) + 0.12 * noise(places, 0.030, 62),
+        )
         tone += 0.3 * (1 - full)
         order = -roots.real * (1 + 0.06 * normal(size=count))
         # Where they grew from before the parting, they begin there.

@@ -14,7 +14,7 @@ SEGMENTS = 2
 GLOSS = 0.1
 GROUPS = (
     # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
-    ("front", 70, (0.003, 0.022), (0.014, 0.034), 0.00035, 0.0040),
+    ("front", 70, (0.005, 0.024), (0.010, 0.024), 0.00030, 0.0030),
     ("crown", 45, (0.026, 1.0), (0.018, 0.034), 0.00040, 0.0030),
     ("stray", 60, (0.030, 1.0), (0.022, 0.045), 0.00025, 0.0060),
 )
