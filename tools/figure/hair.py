@@ -226,14 +226,12 @@ def paint_locks(p: Float64, step: Float64, above: Float64, hair: Hair) -> tuple[
     # Between strands one sees deep into full hair, but the skin where it is sparse.
     gaps = (1 - cover) * smoothstep((above - 0.002) / THINNING)
     cover = cover + gaps
+    # Single hairs at the edge are finer than a texel.
+    thin = 0.55 + 0.45 * smoothstep(above / THINNING)
+    tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
     if not hair.curly:
         parted, beside = _parting(p, above)
         cover = cover * (1 - parted)
-    # Single hairs at the edge are finer than a texel.
-    thin = 0.55 + 0.45 * smoothstep(above / THINNING)
-    places = strand_places(p)
-    tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
-    if not hair.curly:
         bright = shine(unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69))
         tone = tone * (1 + 0.5 * bright) + 0.36 * bright + beside
     return tone, np.where(above < -0.5, 0.0, cover * thin)
