@@ -26,48 +26,52 @@ TOP = (0.0, 0.95)
 """Slopes of the head, as the sine of the angle, between which the hair reaches the thickness of the top."""
 CALM = (0.080, 0.098)
 """Heights of the skin between which locks cease to stand out, metres."""
-PARTING = np.array([[0.034, 0.071, 0.000], [0.012, 0.106, -0.135]])
-"""Ends of the parting, on the subject's left, from the hairline to the crown; all strands lead away from it,
-metres."""
+PARTING = np.array([[0.040, 0.045, 0.008], [0.012, 0.106, -0.135]])
+"""Ends of the parting, on the subject's left, from the forehead to the crown; all strands lead away from it,
+metres. Before the hairline it is not seen, but strands at the hairline lead across, not all ways."""
+PARTED, MIXED = 0.0009, 0.0020
+"""Half the width of the parting, and how far from it strands of both sides cross, metres."""
 TONES = (-0.85, -0.30, 0.35, 1.0)
 """How bright hair is where it has each of its colours."""
 RADIUS = 0.1
 """Of the ball onto which places on the scalp are carried for their strands, metres."""
 VOLUMES = (
     # a place on the left, and how far around it, metres
-    ((0.0, 0.090, -0.020), (0.055, 0.030, 0.030)),
+    ((0.0, 0.090, -0.025), (0.065, 0.040, 0.045)),
     ((0.0, 0.030, -0.185), (0.060, 0.045, 0.040)),
 )  # fmt: skip
 """Where hair is thicker than elsewhere: above the forehead, behind."""
 DEEPEST = -0.008
 """Least thickness: the skull is flatter at its corners than hair lets it look, metres."""
+NEIGHBOURS, EVENED, EDGE = 80, 0.014, 0.014
+"""Vertices, and metres around, over which the thickness is averaged; metres over which it begins."""
 EARS = (0.0785, 0.0085)
 """Farther from the middle, and lower, than this (m) there are ears, which have no hair."""
 AXIS = -0.085
 """z of the vertical axis around which the angles of the hairline are measured."""
 
 
-LOCKS = (9000, 9000)
+LOCKS = (11000, 9000)
 """How many locks of straight and of curly hair are painted."""
 RAGGED = (0.0012, 0.0024)
 """How far, metres, the painted hairline of straight and of curly hair wanders."""
-THINNING = 0.016
+THINNING = 0.012
 """Metres above the hairline over which hair becomes full."""
 CROPPED = (
     # a place on the left, how far around it, metres; how much
-    ((0.0, -0.048, -0.185), (0.075, 0.035, 0.075), 2.4),
-    ((0.076, -0.016, -0.066), (0.020, 0.022, 0.016), 1.4),
+    ((0.0, -0.050, -0.185), (0.085, 0.042, 0.075), 2.8),
+    ((0.076, -0.020, -0.066), (0.020, 0.028, 0.018), 2.6),
 )
 """Where hair is cropped ever shorter towards its edge: the nape and the sideburn."""
-STRANDS, SEGMENTS = 10, 6
+STRANDS, SEGMENTS = 16, 6
 """Of each lock, and straight pieces of each strand."""
-WIDTH = 0.0006
+WIDTH = 0.0004
 """Of a strand, metres."""
-PROFILES = np.array([[-0.22, -0.08, 0.0, 0.06, 0.12, 0.16], [-0.42, 0.0, 0.25, 0.25, 0.0, -0.42]])
+PROFILES = np.array([[-0.14, -0.04, 0.03, 0.06, 0.04, -0.02], [-0.42, 0.0, 0.25, 0.25, 0.0, -0.42]])
 """How much brighter a strand is from its root to its tip: of straight and of curly hair."""
 DARKEST, BRIGHTEST = -1.4, 1.4
 """Tones at the ends of what a picture holds."""
-DEEP = (-0.7, -0.62)
+DEEP = (-0.5, -0.62)
 """Tones between strands of straight and of curly hair."""
 REACH, SCALE, SOFT = 3.25, 900, 2.0
 """Extent of `strand_places` away from the parting; pixels to a unit of them; pixels of blur."""
@@ -106,15 +110,25 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
         full = full + more * np.exp(-(((folded - place) / reach) ** 2).sum(axis=1))
     # Not on the crown, whose highest point is a feature point.
     lumps = hair.lumps * (1 - smoothstep((folded[:, 1] - CALM[0]) / (CALM[1] - CALM[0])))
-    full = full + lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
+    lumps = lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
     # Before the ears hair lies close to the head.
     ahead = smoothstep((folded[:, 2] + 0.135) / 0.05) * (1 - smoothstep((folded[:, 1] + 0.015) / 0.085))
-    full = full * (1 - 0.8 * ahead)
-    # Locks end in a rounded edge, but hair of the temples and the nape grows thinner downwards.
+    full = np.maximum(full * (1 - 0.8 * ahead), DEEPEST)
+    # Hair of the temples and the nape grows thinner downwards.
     low = smoothstep((0.06 - folded[:, 1]) / 0.05)
     share = np.clip(above / (hair.rise * (1 + 2 * low)), 0.0, 1.0)
-    share = (share * (2 - share)) ** (0.6 + 0.4 * low) * smoothstep((above - 0.005) / 0.010)
-    return vertices + unit(vertices - MIDDLE) * (share * np.maximum(full, DEEPEST))[:, None]
+    share = share * (2 - share)
+    thick = (_evened(vertices, above, full * share) + lumps * share) * smoothstep((above - 0.001) / EDGE)
+    return vertices + unit(vertices - MIDDLE) * thick[:, None]
+
+
+def _evened(vertices: Float64, above: Float64, thick: Float64) -> Float64:
+    """Return thicknesses (V,) averaged with those around: on bumps and steep edges strands would look like
+    the grain of wood, which is cut likewise. above: (V,), heights above the hairline."""
+    free = np.flatnonzero(above > -0.5)  # not ears
+    apart, near = cKDTree(vertices[free]).query(vertices, k=NEIGHBOURS)
+    share = np.exp(-((apart / EVENED) ** 2)) + 1e-9
+    return (share * thick[free][near]).sum(axis=1) / share.sum(axis=1)
 
 
 def _roundness(vertices: Float64, scalp: Bool) -> Float64:
@@ -141,22 +155,14 @@ def height_above_hairline(positions: Float64) -> Float64:
     return np.where(ears, -1.0, above)
 
 
-def painted_height(positions: Float64, grown: Float64, hair: Hair) -> Float64:
+def painted_height(positions: Float64, hair: Hair) -> Float64:
     """Return (N,) heights above the hairline as hair is painted: less where it is cropped, and irregular.
 
-    positions, grown: (N, 3), of the skin, and with the layer of hair.
+    positions: (N, 3), of the skin.
     """
     ragged = RAGGED[int(hair.curly)] * (noise(positions, 0.011, 71) + 0.7 * noise(positions, 0.004, 72))
     above = height_above_hairline(positions)
-    height = np.where(above > -0.5, (above + ragged) / (1 + _cropped(positions)), above)
-    if hair.curly:
-        return height
-    # Along the parting, which ends softly on the crown, there is scalp as well.
-    places = strand_places(grown)
-    away = places.real * _metres(places) + 0.0012 * noise(positions, 0.004, 67)
-    crossed = 0.006 * np.maximum(noise(positions, 0.006, 68), 0.0)  # by strands of the other side
-    behind = 0.010 * smoothstep((0.95 - np.cos(places.imag)) / 0.7)
-    return np.minimum(height, 0.008 + crossed + behind + 6 * np.maximum(away, 0.0))
+    return np.where(above > -0.5, (above + ragged) / (1 + _cropped(positions)), above)
 
 
 def _cropped(positions: Float64) -> Float64:
@@ -222,13 +228,28 @@ def paint_locks(p: Float64, step: Float64, above: Float64, hair: Hair) -> tuple[
     cover = cover + gaps
     # Single hairs at the edge are finer than a texel.
     thin = 0.55 + 0.45 * smoothstep(above / THINNING)
-    places = strand_places(p)
-    deep = DEEP[int(hair.curly)] * (1 if hair.curly else smoothstep(places.real * _metres(places) / 0.006))
-    tone = (drawn + gaps * deep) / np.maximum(cover, 0.02)
+    tone = (drawn + gaps * DEEP[int(hair.curly)]) / np.maximum(cover, 0.02)
     if not hair.curly:
+        parted, beside = _parting(p, above)
+        cover = cover * (1 - parted)
         bright = shine(unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69))
-        tone = tone * (1 + 0.2 * bright) + 0.32 * bright
+        tone = tone * (1 + 0.5 * bright) + 0.36 * bright + beside
     return tone, np.where(above < -0.5, 0.0, cover * thin)
+
+
+def _parting(p: Float64, above: Float64) -> tuple[Float64, Float64]:
+    """Return (N,) how much of the scalp is seen at points (N, 3), and (N,) how much brighter hair is there.
+
+    The parting ends softly at the hairline and on the crown. above: (N,), heights above the hairline.
+    """
+    places = strand_places(p)
+    away = places.real * _metres(places)
+    line = np.maximum(away + 0.0004 * noise(p, 0.003, 67), 0.0)
+    crossed = 0.75 - 0.35 * noise(p, 0.006, 68)  # by strands of the other side
+    ends = smoothstep((np.cos(places.imag) + 0.75) / 0.7) * smoothstep((above - 0.004) / 0.012)
+    # Beside it hair rises out of the shade.
+    risen = 0.16 * np.exp(-(((away - 0.015) / 0.009) ** 2)) - 0.25 * np.exp(-((away / 0.003) ** 2))
+    return crossed * ends * np.exp(-((line / PARTED) ** 2)), ends * risen
 
 
 def shine(rise: Float64) -> Float64:
@@ -239,15 +260,20 @@ def shine(rise: Float64) -> Float64:
 def _look_up(picture: tuple[Float64, Float64], p: Float64) -> tuple[Float64, Float64]:
     """Return (N,) what the two pictures of `_draw_locks` hold at points (N, 3)."""
     places = strand_places(p)
-    at = np.stack([places.real, places.imag + np.pi]) * SCALE
-    drawn, cover = (map_coordinates(values, at, order=1) for values in picture)
+    # At the parting, where the pictures' edges meet, both sides are mixed.
+    across = 0.5 * np.exp(-((places.real * _metres(places) / MIXED) ** 2))
+    drawn, cover = np.zeros(len(p)), np.zeros(len(p))
+    for share, along in ((1 - across, places.imag), (across, -places.imag)):
+        at = np.stack([places.real, along + np.pi]) * SCALE
+        drawn += share * map_coordinates(picture[0], at, order=1)
+        cover += share * map_coordinates(picture[1], at, order=1)
     return drawn, cover
 
 
 def _metres(places: Complex128) -> Float64:
     """Return (N,) how many metres of the head a unit of `strand_places` is, the same in all directions."""
     focus = _map_axes()[3]
-    steep = np.maximum(np.abs(np.sinh(places)), 0.03)
+    steep = np.maximum(np.abs(np.sinh(places)), 0.15)
     return 2 * RADIUS * focus * steep / (1 + np.abs(focus * np.cosh(places)) ** 2)
 
 
@@ -275,12 +301,18 @@ def _sow_locks(p: Float64, above: Float64, hair: Hair) -> Locks:
         bend = uniform(3.5, 6.5, count) * random.choice((-1, 1), count)
         order = tone = 0.7 * tone + 0.12 * noise(places, 0.007, 64)
     else:
-        length = (0.005 + full * (0.011 + 0.022 * long)) * uniform(0.7, 1.2, count)
+        length = (0.005 + full * (0.020 + 0.026 * long)) * uniform(0.7, 1.2, count)
         length /= 1 + 0.5 * _cropped(places)
         width = (0.0040 + 0.0016 * full * long) * uniform(0.7, 1.3, count)
-        heading, bend = normal(0, 0.07, count), normal(0, 0.10, count) + 0.25 * noise(places, 0.020, 62)
+        heading, bend = (
+            normal(0, 1, count) * (0.05 + 0.25 * (1 - full)),
+            normal(0, 0.08, count) + 0.12 * noise(places, 0.030, 62),
+        )
         tone += 0.3 * (1 - full)
         order = -roots.real * (1 + 0.06 * normal(size=count))
+        # Where they grew from before the parting, they begin there.
+        first = uniform(0.0, 0.0010, count) / _metres(roots)
+        roots = np.maximum(roots.real - 0.5 * length / _metres(roots), first) + 1j * roots.imag
     order = np.argsort(order)
     return Locks(*(values[order] for values in (roots, length, width, heading, bend, tone, full)))
 
@@ -295,7 +327,7 @@ def _draw_locks(locks: Locks, hair: Hair) -> tuple[Float64, Float64]:
     each = np.repeat(np.arange(len(locks.roots)), STRANDS)
     full, length = locks.fullness[each], locks.lengths[each] * random.uniform(0.65, 1.1, len(each))
     across = random.uniform(-1, 1, len(each))
-    tone = locks.tones[each] - 0.35 * across**2 + random.normal(0, 0.22, len(each))
+    tone = locks.tones[each] - 0.22 * across**2 + random.normal(0, 0.26, len(each))
     path, widths, at = [], [], locks.roots[each]
     at = at + (1 - full) * random.uniform(-0.006, 0.006, len(each)) / _metres(at)
     side = 1j * across * locks.widths[each] / 2

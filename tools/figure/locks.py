@@ -14,9 +14,9 @@ SEGMENTS = 2
 GLOSS = 0.1
 GROUPS = (
     # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
-    ("front", 100, (0.003, 0.022), (0.014, 0.034), 0.00070, 0.0050),
-    ("crown", 30, (0.026, 1.0), (0.016, 0.030), 0.00110, 0.0040),
-    ("stray", 45, (0.030, 1.0), (0.020, 0.045), 0.00040, 0.0070),
+    ("front", 70, (0.005, 0.024), (0.010, 0.024), 0.00030, 0.0030),
+    ("crown", 45, (0.026, 1.0), (0.018, 0.034), 0.00040, 0.0030),
+    ("stray", 60, (0.030, 1.0), (0.022, 0.045), 0.00025, 0.0060),
 )
 NEIGHBOURS = 8
 """Vertices between which the depth of the layer is interpolated."""
@@ -33,14 +33,14 @@ def locks(bare: Float64, grown: Float64, triangles: Integer, hair: Hair) -> Mesh
         random = np.random.default_rng(91 + seed)
         roots = _roots(bare, triangles, name, heights, count, random)
         length = random.uniform(*lengths, count)
-        bend = random.normal(0.0, 0.10, count) + 0.30 * noise(roots, 0.012, 92)  # neighbours alike
+        bend = random.normal(0.0, 0.08, count) + 0.20 * noise(roots, 0.012, 92)  # neighbours alike
         lifts = lift * random.uniform(0.3, 1.3, count) * hair.loose
         if hair.curly:
             bend, length = np.sign(bend) * random.uniform(1.4, 3.0, count), length * 0.40
             lifts = -lifts if name != "crown" else lifts  # hidden: single curls would look like scratches
         paths = _paths(roots, length, bend, lifts, depth)
         blades += [_blade(path, width * random.uniform(0.6, 1.3)) for path in paths]
-        colours += list(_colours(random.normal(0.10, 0.20, count) + 0.4 * shine(unit(roots - MIDDLE)[:, 1])))
+        colours += list(_colours(random.normal(0.0, 0.15, count) + 0.3 * shine(unit(roots - MIDDLE)[:, 1])))
     pattern = blade_triangles(SEGMENTS)
     return join([(b, pattern, np.tile(c, (len(b), 1))) for b, c in zip(blades, colours, strict=True)])
 

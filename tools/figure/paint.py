@@ -131,7 +131,7 @@ def _hair(colour: Float64, p: Float64, grown: tuple[Float64, Float64], looks: Lo
 
     grown: as of `_grown_chart`. Strands lie straight on that: triangles of the skin are stretched by hair.
     """
-    above = painted_height(p, grown[0], looks.hair)
+    above = painted_height(p, looks.hair)
     near = above > -0.02
     above, hair = above[near], looks.hair
     tone, cover = paint_locks(grown[0][near], grown[1][near], above, hair)

@@ -104,7 +104,7 @@ void main() {
     float cosine = dot(rough, normalize(view + KEY_DIRECTION));
     vec2 left = unlost(albedo);
     vec3 shown = albedo * diffuse(n, albedo, reach, scatter * min(colour.a * 40.0, 1.0))
-        + KEY * (mirrored_key(view, n, reach) * left.x * lobes(cosine * cosine, coordinates.w))
+        + KEY * (mirrored_key(view, n, colour.a, reach) * left.x * lobes(cosine * cosine, coordinates.w))
         + AROUND * (mirrored_around(view, n, colour.a, reach) * left.y);
 #endif
     pixel = vec4(encode(shown), opaque);

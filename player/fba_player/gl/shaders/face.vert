@@ -176,7 +176,7 @@ void main() {
     keyed = shade.rgb - in_colour.rgb * diffuse(n, albedo, vec4(0.0, reach.yzw), scattered);
 #endif
     vec2 left = unlost(in_colour.rgb);
-    shade.a = mirrored_key(view, n, reach) * left.x;
+    shade.a = mirrored_key(view, n, in_colour.a, reach) * left.x;
     halfway.xyz = normalize(view + KEY_DIRECTION);
     halfway.w = mirrored_around(view, n, in_colour.a, reach) * left.y;
 #else

@@ -72,8 +72,13 @@ float mirrored(float nl, float vl) {
     return (0.028 + 0.95 * off * off) * nl / max(hh, 0.9);
 }
 
-float mirrored_key(vec3 view, vec3 n, vec4 reach) {
-    return mirrored(max(dot(n, KEY_DIRECTION), 0.0), dot(view, KEY_DIRECTION)) * reach.x;
+// Hair on a scalp, which has no gloss, does not shine as a whole: that would be a grey veil on it.
+float veil(float gloss) {
+    return min(0.25 + gloss * 20.0, 1.0);
+}
+
+float mirrored_key(vec3 view, vec3 n, float gloss, vec4 reach) {
+    return mirrored(max(dot(n, KEY_DIRECTION), 0.0), dot(view, KEY_DIRECTION)) * veil(gloss) * reach.x;
 }
 
 const vec3 AROUND = vec3(0.44, 0.45, 0.48);
@@ -86,7 +91,7 @@ float mirrored_around(vec3 view, vec3 n, float gloss, vec4 reach) {
     float nh2 = min((nv + rl) * (nv + rl) / max(2.0 + 2.0 * vl, 0.1), 1.0);
     float soft = widths(gloss);
     float a = nh2 * (soft - 1.0) + 1.0;
-    float rim = mirrored(rl, vl) * soft / (a * a) * reach.w * 1.1;
+    float rim = mirrored(rl, vl) * soft / (a * a) * veil(gloss) * reach.w * 1.1;
     float rough = clamp(1.0 - gloss, 0.12, 1.0);
     float graze = 1.0 - nv;
     graze *= graze;
