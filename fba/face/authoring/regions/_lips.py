@@ -64,7 +64,7 @@ ARCS = {
     55: "upper left", 56: "upper right", 57: "lower left", 58: "lower right",
 }  # fmt: skip
 """Handles beside the corners of the mouth, by the FAPs that make an arc between them."""
-ARC = (1.5, 0.0)
+ARC = (1.6, 1.5)
 """How high the arc is on the inner and the outer contour, as shares of the motion of the handle."""
 ARC_POWERS = (0.8, 2.4)
 """How round it begins at the corner, and how flat it ends at the handle: nearly a quarter of an ellipse."""
@@ -133,7 +133,7 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             motions[number], motions[mate] = pair
     for number in FLATTENS.keys() & motions.keys():
         motions[number] = _flatter(marks, limiter, lips, number, motions[number])
-    for number in (ARCS | RAISING).keys() & motions.keys() & set(range(50)):
+    for number in sorted((ARCS | RAISING).keys() & motions.keys()):
         _add_arcs(marks, limiter, lips, number, motions)
     return {fap: add_smile(marks, limiter, fap, motion) for fap, motion in motions.items()}, lost
 
@@ -333,7 +333,7 @@ def _add_arcs(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motions
     pinned = marks.on_contours(*LIP_CONTOURS)
     for sign, field in zip((-1.0, 1.0), _arc_fields(marks, lips, fap), strict=True):
         done = 0.0
-        for number in (fap, faps()[fap - 1].lip_mate or fap):
+        for number in (fap, faps()[fap - 1].lip_mate or fap) if fap < 50 else (fap,):
             for most in ARC_VALUES if number in motions else ():
                 if most <= done:
                     break
@@ -361,7 +361,7 @@ def _arc_fields(marks: Landmarks, lips: _Lips, fap: int) -> tuple[Float64, Float
         shares = {f"{lip} {side}": (-low, -high) for lip, (low, high) in CORNER_ARCS.items()}
     field = np.zeros((2, len(lips.inward)))
     for name, share in shares.items():
-        field += np.array(share)[:, None] * lips.arc[name] * lips.inward
+        field += np.array(share)[:, None] * lips.arc[name] * (lips.inward if fap < 50 else 1 - lips.inward)
     low, high = field[:, :, None] * marks.step(fap)
     return low, high
 
