@@ -146,13 +146,15 @@ def thin_lid(
     At rest, its skin is as far out as the fold above it, which would come down as a thick flap. points:
     (N, 3), with shares (N,) of the margin's motion. ways: (K,), 1 where the eye is closed.
     """
-    gap = opening.upper[:, 0] - opening.lower[:, 0]
-    high = np.clip(np.interp(points[:, 0], opening.x, gap / gap.max()), 0.0, 1.0)
+    column = np.clip(points[:, 0], opening.x[0], opening.x[-1])
+    margins = [
+        np.hypot(opening.x - eye.centre[0], np.hypot(*line.T)) for line in (opening.upper, opening.lower)
+    ]
+    inner = np.maximum(np.interp(column, opening.x, np.maximum(*margins)), eye.radius)
     arms = points + shifts - eye.centre
     away = np.linalg.norm(arms, axis=2)
-    excess = np.maximum(away - (1 + LID_THICKNESS) * eye.radius, 0.0)
-    part = np.clip(share, 0.0, 1.0)
-    lost = THINNED * smoothstep(ways)[:, None] * part * high ** (1.2 - part) * excess
+    excess = np.maximum(away - inner - LID_THICKNESS * eye.radius, 0.0)
+    lost = THINNED * smoothstep(ways)[:, None] * np.clip(share, 0.0, 1.0) * excess
     return np.asarray(shifts - (lost / away)[:, :, None] * arms)
 
 

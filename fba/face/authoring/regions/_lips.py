@@ -64,7 +64,7 @@ ARCS = {
     55: "upper left", 56: "upper right", 57: "lower left", 58: "lower right",
 }  # fmt: skip
 """Handles beside the corners of the mouth, by the FAPs that make an arc between them."""
-ARC = (1.6, 1.5)
+ARC = (1.7, 1.8)
 """How high the arc is on the inner and the outer contour, as shares of the motion of the handle."""
 ARC_POWERS = (0.8, 2.4)
 """How round it begins at the corner, and how flat it ends at the handle: nearly a quarter of an ellipse."""
