@@ -39,13 +39,13 @@ MAX_DIP_CORRECTION = 0.02
 """Largest correction for an edge that dips into the eyeball, as a share of its radius."""
 BRIDGING_PASSES = 3
 """Number of passes: moving a vertex off the eyeball may pull another edge into it."""
-STRETCHED = (0.02, 0.95)
+STRETCHED = (0.02, 0.85)
 """Shares of the margin's motion between which the skin of a closed upper lid is stretched."""
 OUTER = 1.05
 """Radii of the eyeball beyond which there is the outside of a lid, not its lining."""
 MOST_RAISED = 0.15
 """How far, in radii of the eyeball, that raises or sinks a vertex at most."""
-LID_THICKNESS = 0.10
+LID_THICKNESS = 0.12
 """Distance of a closed lid's skin from the eyeball, in radii of it, that is not made thinner."""
 THINNED = 0.85
 """Share of what is more, that a closed lid loses: the skin of its fold does not come down with it."""
