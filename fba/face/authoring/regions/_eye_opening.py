@@ -43,11 +43,11 @@ STRETCHED = (0.02, 0.85)
 """Shares of the margin's motion between which the skin of a closed upper lid is stretched."""
 OUTER = 1.05
 """Radii of the eyeball beyond which there is the outside of a lid, not its lining."""
-MOST_RAISED = 0.15
+MOST_RAISED = 0.06
 """How far, in radii of the eyeball, that raises or sinks a vertex at most."""
-LID_THICKNESS = 0.12
+LID_THICKNESS = 0.17
 """Distance of a closed lid's skin from the eyeball, in radii of it, that is not made thinner."""
-THINNED = 0.85
+THINNED = 0.7
 """Share of what is more, that a closed lid loses: the skin of its fold does not come down with it."""
 PLATE_RINGS = 3
 """Rings of vertices around it whose positions say how it bends at its edge."""
