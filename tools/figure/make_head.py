@@ -200,6 +200,9 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     gloss = 0.32 + 0.14 * oily + 0.13 * lips + 0.05 * wet - 0.15 * wet * (marks.lip > 0) + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped)  # 0: light does not scatter in hair
+    # What only an open mouth shows of the lips is redder than what the sky lights.
+    inner = np.where(near, 1 - smoothstep((ring - 0.2) / 1.4), 0.0)
+    colours[:, :3] *= 1 - inner[:, None] * (0.06, 0.24, 0.24)
     inside = near & (ring < 0)
     # The throat is darker than the cheeks.
     cheek = smoothstep((np.abs(surface.vertices[:, 0]) - 0.012) / 0.018)

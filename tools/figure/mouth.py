@@ -13,9 +13,9 @@ from fba.arrays import Float64, Integer
 ENAMEL = np.array([0.78, 0.68, 0.55])
 """Linear light."""
 NECK = np.array([0.66, 0.54, 0.37])
-EDGE = np.array([0.66, 0.62, 0.54])
+EDGE = np.array([0.71, 0.635, 0.53])
 """The edge of a crown, through which the dark behind it is seen."""
-CANINE = np.array([0.98, 0.94, 0.88])
+CANINE = np.array([1.0, 0.97, 0.93])
 """Factors of the colour of canines, which are yellower."""
 UNDER_LIP = (0.28, 0.32, 0.34)
 """Shares by which a crown is darker at its neck than at its edge."""
@@ -30,7 +30,7 @@ UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
 LOWER_INSET = 0.0004
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
-SINKING = np.array([0.0, 0.0, 0.2, 0.9, 2.4, 4.8, 7.4]) / 1000
+SINKING = np.array([0.0, 0.1, 0.8, 2.0, 3.6, 5.4, 7.4]) / 1000
 """Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides them."""
 SUNK_GUM = 0.4
 """Share of that by which their gum is deeper: so low a crown is short, too."""
@@ -113,8 +113,8 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     vertices[..., 1] = rows[:, None] * height * sign
     vertices[..., 2] = (cz - 1) * thick / 2 * deep[:, None] + bulge[:, None]
     if place == 3:  # a canine has a point
-        vertices[0, :, 1] += sign * 0.0011 * np.abs(cx)
-        vertices[1, :, 1] += sign * 0.0007 * np.abs(cx)
+        vertices[0, :, 1] += sign * 0.0008 * np.abs(cx)
+        vertices[1, :, 1] += sign * 0.0005 * np.abs(cx)
     corner = np.where(cx > 0, CORNERS[1], CORNERS[0]) / 1000 * np.abs(cx) ** 12 * min(width / 0.0085, 1.0)
     vertices[:2, :, 1] += corner * sign * np.array([[1.0], [0.75]])
     cap = vertices[0].mean(axis=0) * np.array([1, 0, 1]) + np.array(
@@ -129,14 +129,14 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     lid = lid[:, ::-1] if sign < 0 else lid
     share = np.clip(rows / 1.0, 0, 1) ** 2
     # Teeth further back lie in the shade of the cheeks, whose light is red, and recede into the dark.
-    shaded = (0.90, 0.86, 0.83) if sign > 0 else (0.85, 0.79, 0.75)
+    shaded = (0.90, 0.855, 0.82) if sign > 0 else (0.87, 0.81, 0.77)
     behind = np.array(shaded) ** (max(place - 1.4, 0) ** 1.15)
     behind *= 1 + UNEVEN * np.random.default_rng(place).uniform(-1, 1)
     # Less light falls in under the lips.
     colour = (ENAMEL * (1 - share[:, None]) + NECK * share[:, None]) * behind
     colour *= 1 - np.array(UNDER_LIP) * np.clip(rows[:, None], 0, 1)
     if place < 3:
-        colour[:2] *= EDGE / ENAMEL * [[1.0], [1.04]]
+        colour[:2] *= EDGE / ENAMEL * [[1.0], [1.06]]
     elif place == 3:
         colour *= CANINE
     fissure = 1.0 if flat < 0.5 else 0.72

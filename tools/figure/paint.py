@@ -299,7 +299,7 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Loo
     x, lower = np.abs(p[:, 0]), side < 0
     corner = smoothstep((x - 0.015) / 0.012)
     # The red of the lips is narrower in the corners; that of the lower lip is soft at its edge.
-    border = np.where(lower, 4.7 - 1.3 * smoothstep((x - 0.007) / 0.020), 4.6 - 1.7 * corner)
+    border = np.where(lower, 4.7 - 0.8 * smoothstep((x - 0.007) / 0.020), 4.6 - 1.4 * corner)
     soft = np.where(lower, 2.6, 1.8)
     red = np.where(near, smoothstep((border + 0.45 * soft - ring) / soft), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4

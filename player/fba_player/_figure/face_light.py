@@ -235,7 +235,7 @@ class FaceLight:
         behind = still[self._lips, 2].max() - still[:, 2]
         depth = behind / (THROAT * self._model.fapu.ES * 1024)
         share = np.clip(1 - (1 - DARKEST) * depth, DARKEST, 1.0)
-        wide = _lit_inside(cached_visibility(moved, normals, triangles, near), sky, share)
+        wide = self._lit_lines(_lit_inside(cached_visibility(moved, normals, triangles, near), sky, share))
         arrays = [
             np.where(near[:, None] if before.ndim == 2 else near, after, before)
             for before, after in zip(shut, wide, strict=True)

@@ -39,12 +39,16 @@ MAX_DIP_CORRECTION = 0.02
 """Largest correction for an edge that dips into the eyeball, as a share of its radius."""
 BRIDGING_PASSES = 3
 """Number of passes: moving a vertex off the eyeball may pull another edge into it."""
-STRETCHED = (0.02, 0.7)
+STRETCHED = (0.02, 0.85)
 """Shares of the margin's motion between which the skin of a closed upper lid is stretched."""
 OUTER = 1.05
 """Radii of the eyeball beyond which there is the outside of a lid, not its lining."""
 MOST_RAISED = 0.06
 """How far, in radii of the eyeball, that raises or sinks a vertex at most."""
+LID_THICKNESS = 0.17
+"""Distance of a closed lid's skin from the eyeball, in radii of it, that is not made thinner."""
+THINNED = 0.7
+"""Share of what is more, that a closed lid loses: the skin of its fold does not come down with it."""
 PLATE_RINGS = 3
 """Rings of vertices around it whose positions say how it bends at its edge."""
 SLACK = 0.01
@@ -132,6 +136,26 @@ def slide_lid(
         shifts[k, :, 2] = (depth * cos - height * sin) * grown - depth
     shifts[way == 0] = 0.0
     return shifts
+
+
+def thin_lid(
+    points: Float64, share: Float64, shifts: Float64, ways: Float64, opening: Opening, eye: Eye
+) -> Float64:
+    """Return the shifts (K, N, 3) of an upper lid that grows thin as it closes, as a lid does.
+
+    At rest, its skin is as far out as the fold above it, which would come down as a thick flap. points:
+    (N, 3), with shares (N,) of the margin's motion. ways: (K,), 1 where the eye is closed.
+    """
+    column = np.clip(points[:, 0], opening.x[0], opening.x[-1])
+    margins = [
+        np.hypot(opening.x - eye.centre[0], np.hypot(*line.T)) for line in (opening.upper, opening.lower)
+    ]
+    inner = np.maximum(np.interp(column, opening.x, np.maximum(*margins)), eye.radius)
+    arms = points + shifts - eye.centre
+    away = np.linalg.norm(arms, axis=2)
+    excess = np.maximum(away - inner - LID_THICKNESS * eye.radius, 0.0)
+    lost = THINNED * smoothstep(ways)[:, None] * np.clip(share, 0.0, 1.0) * excess
+    return np.asarray(shifts - (lost / away)[:, :, None] * arms)
 
 
 def stretch_fold(

@@ -24,6 +24,7 @@ from fba.face.authoring.regions._eye_opening import (
     push_vertices_outside,
     slide_lid,
     stretch_fold,
+    thin_lid,
 )
 from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.surface._fold_limits import Limiter
@@ -150,6 +151,7 @@ def lid_motion(
         motion = unfold(marks.surface, sculptors, Motion(values, vertices, shifts), pinned, True)
     else:
         if lid == "upper" and not follows:
+            shifts = thin_lid(points, share[vertices], shifts, values / CLOSED, opening, eye)
             shifts = stretch_fold(marks.surface, share, vertices, shifts, values / CLOSED, eye)
         profile = measure_profile(eye, parts, edge_length(marks, own, other))
         # margins that lie in the eyeball, or close to it, meet where they are

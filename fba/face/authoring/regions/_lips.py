@@ -64,7 +64,7 @@ ARCS = {
     55: "upper left", 56: "upper right", 57: "lower left", 58: "lower right",
 }  # fmt: skip
 """Handles beside the corners of the mouth, by the FAPs that make an arc between them."""
-ARC = (1.5, 0.0)
+ARC = (1.7, 1.8)
 """How high the arc is on the inner and the outer contour, as shares of the motion of the handle."""
 ARC_POWERS = (0.8, 2.4)
 """How round it begins at the corner, and how flat it ends at the handle: nearly a quarter of an ellipse."""
@@ -121,7 +121,7 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             if number in PUSH:
                 share = lips.inward + OUTER_PUSH * (1 - lips.inward)
             else:
-                share = lips.inward if faps()[number - 1].group == 2 else 1 - lips.inward
+                share = lips.inward if _is_inner(number) else 1 - lips.inward
             field = field * share[:, None]
             moving = np.flatnonzero(np.abs(field).max(axis=1) > 0)
             motions[number] = eased_linear_motion(surface, limiter, moving, field[moving], number, pinned)
@@ -133,7 +133,7 @@ def lip_motions(marks: Landmarks, limiter: Limiter) -> tuple[dict[int, Motion], 
             motions[number], motions[mate] = pair
     for number in FLATTENS.keys() & motions.keys():
         motions[number] = _flatter(marks, limiter, lips, number, motions[number])
-    for number in (ARCS | RAISING).keys() & motions.keys() & set(range(50)):
+    for number in sorted((ARCS | RAISING).keys() & motions.keys()):
         _add_arcs(marks, limiter, lips, number, motions)
     return {fap: add_smile(marks, limiter, fap, motion) for fap, motion in motions.items()}, lost
 
@@ -326,14 +326,15 @@ def _flatter(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motion: 
 
 
 def _add_arcs(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motions: dict[int, Motion]) -> None:
-    """Add the arcs beside a corner of the mouth to the motion of an inner FAP, in place.
+    """Add the arcs beside a corner of the mouth to the motion of a FAP, in place.
 
-    Where they would fold its skin, which the outer contour leaves no more room, they go on with its mate.
+    Where those of an inner FAP would fold its skin, which the outer contour leaves no more room, they go on
+    with its mate.
     """
     pinned = marks.on_contours(*LIP_CONTOURS)
     for sign, field in zip((-1.0, 1.0), _arc_fields(marks, lips, fap), strict=True):
         done = 0.0
-        for number in (fap, faps()[fap - 1].lip_mate or fap):
+        for number in (fap, faps()[fap - 1].lip_mate or fap) if _is_inner(fap) else (fap,):
             for most in ARC_VALUES if number in motions else ():
                 if most <= done:
                     break
@@ -343,6 +344,11 @@ def _add_arcs(marks: Landmarks, limiter: Limiter, lips: _Lips, fap: int, motions
                 if _is_sound(limiter, shaped):
                     motions[number], done = shaped, most
                     break
+
+
+def _is_inner(fap: int) -> bool:
+    """Return whether a FAP of the lips moves their inner contour."""
+    return faps()[fap - 1].group == 2
 
 
 def _is_sound(limiter: Limiter, motion: Motion) -> bool:
@@ -360,8 +366,9 @@ def _arc_fields(marks: Landmarks, lips: _Lips, fap: int) -> tuple[Float64, Float
         side = "left" if RAISING[fap] > 0 else "right"
         shares = {f"{lip} {side}": (-low, -high) for lip, (low, high) in CORNER_ARCS.items()}
     field = np.zeros((2, len(lips.inward)))
+    own = lips.inward if _is_inner(fap) else 1 - lips.inward
     for name, share in shares.items():
-        field += np.array(share)[:, None] * lips.arc[name] * lips.inward
+        field += np.array(share)[:, None] * lips.arc[name] * own
     low, high = field[:, :, None] * marks.step(fap)
     return low, high
 
