@@ -245,8 +245,8 @@ def _parting(p: Float64, above: Float64) -> tuple[Float64, Float64]:
     places = strand_places(p)
     away = places.real * _metres(places)
     line = np.maximum(away + 0.0004 * noise(p, 0.003, 67), 0.0)
-    crossed = 0.75 - 0.35 * noise(p, 0.006, 68)  # by strands of the other side
-    ends = smoothstep((np.cos(places.imag) + 0.75) / 0.7) * smoothstep((above - 0.004) / 0.012)
+    crossed = 0.48 - 0.30 * noise(p, 0.006, 68)  # by strands of the other side
+    ends = smoothstep((np.cos(places.imag) + 0.75) / 0.7) * smoothstep((above - 0.004) / 0.022)
     # Beside it hair rises out of the shade.
     risen = 0.16 * np.exp(-(((away - 0.015) / 0.009) ** 2)) - 0.25 * np.exp(-((away / 0.003) ** 2))
     return crossed * ends * np.exp(-((line / PARTED) ** 2)), ends * risen
