@@ -209,9 +209,9 @@ class Renderer:
             gl.viewport = (0, 0, *size)
             gl.enable_only(gl.NOTHING)
             self._studio.render()
+        target.use()  # first, as only then its scissor bounds what is copied
         if self._backdrop is not None and self._backdrop[0] == key:
             gl.copy_framebuffer(target, self._backdrop[2])
-        target.use()
         gl.viewport = (0, 0, *size)
         return self._draw_shadows(view, matrix)
 

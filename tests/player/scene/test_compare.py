@@ -290,6 +290,7 @@ def test_a_wipe_shows_each_on_its_side_of_the_line(pair: CompareScene) -> None:
         line = slice(78, 82)
         for half, whole in ((slice(2, 76), 1.0), (slice(84, 158), 0.0)):
             assert np.abs(pictures[0.5][:, half] - pictures[whole][:, half]).max() <= 2
+            assert np.ptp(pictures[0.5][:, half], axis=1).max() > 60  # a figure, not only the backdrop
         assert np.abs(pictures[0.0][:, 10:150] - pictures[1.0][:, 10:150]).max() > 60
         assert (pictures[0.5][:, line].min(axis=(0, 2)) > 200).any()
     finally:
