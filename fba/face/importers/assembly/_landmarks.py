@@ -49,7 +49,7 @@ class Tuning:
     lip_slope: float = 0.05  # by which a vertex must be nearer to the other lip to be farther aside
     max_half_mouth: float = 0.7  # width that half a mouth has at most, in distances of the eyes
     slit_step: float = 0.02  # width of a step along the line between the lips, in distances of the eyes
-    slit_end: float = 0.15  # lips still part at the corner by this share of their gap in the middle
+    slit_end: float = 0.2  # lips still part at the corner by this share of their gap in the middle
     min_loop_vertices: int = 6  # number of vertices that the opening of an eye has around it at least
     # distance of front teeth from the middle, and from the foremost of the row, in distances of the pupils
     front_teeth: float = 0.12
@@ -320,8 +320,8 @@ def _mouth(
         if not candidates.any():
             continue
         shape = next((s for s in (f"mouthSmile{side}", f"mouthStretch{side}") if s in shapes), None)
+        end = _end_of_slit(vertices, drop, level & front, float(middle[0]), sign, apart)
         if shape is None:
-            end = _end_of_slit(vertices, drop, level & front, float(middle[0]), sign, apart)
             if end is None and inner not in on_edge:
                 continue
             points[inner] = on_edge[inner] if end is None else vertices[end]
@@ -334,6 +334,10 @@ def _mouth(
             within = (corner[0] - vertices[:, 0]) * sign > 0.015 * apart
             away = np.linalg.norm(vertices - corner + (0.035 * apart * sign, 0, 0), axis=1)
             points[inner] = vertices[int(np.where(within & front, away, np.inf).argmin())]
+            if end is not None and (points[inner][0] - vertices[end, 0]) * sign > 0:
+                points[inner] = vertices[
+                    end
+                ]  # a smile can move the skin beside the lips further than their corner
         points[inner] = on_edge.get(inner, points[inner])
         # the contours need skin between them: next to each other, one could not move without the other
         beyond = points[inner] + (TUNING.corner_width * apart * sign, 0.0, 0.25 * TUNING.corner_width * apart)
