@@ -48,7 +48,7 @@ NECKLINE = (
 """Degrees from the front about the neck, and the height of the collar there."""
 FOLD, DEEP = 0.003, 0.022
 """Metres by which the inside of an edge reaches below the skin, and back under the cloth."""
-LONGEST, REFINED = 0.0175, 2
+LONGEST, REFINED = 0.024, 2
 """Metres to which edges of the cloth are halved, so that outlines are round, and how often at most."""
 NEAREST = 4
 """Vertices of the cloth from which what is folded in under them has its weights."""

@@ -34,7 +34,7 @@ class Tuning:
     first_iterations: int = 6  # number of iterations of the fit from each direction
     full_fits: int = 6  # number of best fits that are completed
     iterations: int = 25  # number of further iterations of these
-    max_point_distance: float = 0.014  # distance of a marker from its feature point, in metres
+    max_point_distance: float = 0.015  # distance of a marker from its feature point, in metres
     min_placed: float = 0.4  # share of the markers that must be near feature points
     max_error: float = 0.006  # root mean square distance, in metres, of the cloud of a face
     min_depth: float = -0.09  # z, in metres, of the head's surface that carries markers

@@ -40,7 +40,7 @@ TEXTURE_BYTES = 60_000
 TEXTURE_SIZE = 1024
 """Pixels that the wider side of such a picture keeps."""
 TEXTURE_QUALITY = 29
-COORDINATE_STEP = 1 / 8192
+COORDINATE_STEP = 1 / 4096
 SWAY_STEP = 1 / 8192
 HAIR_STEP = 1 / 127
 LENGTH_STEP = 1 / 1024

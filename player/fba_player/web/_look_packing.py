@@ -23,7 +23,7 @@ from fba_player.web._container import Container, rounded
 
 VISIBLE, THROUGH = 12, 6
 """Numbers a vertex for the light that reaches it, and for that which comes through the skin."""
-LIGHT_STEP = 1 / 64
+LIGHT_STEP = 1 / 60
 """Light is a sum of multiples of it: within 0.05 at 99 of 100 vertices."""
 TURNS = 400
 """Rotations of a head over which that is optimal; half of them also turn all round, as bodies do."""
