@@ -2,7 +2,7 @@
 
     python tools/figure/make_figures.py
 
-To be run after each change of `head.glb` (`make_head.py` does) or `body.glb` (`make_body.py` does).
+To be run after each change of `head.glb` or `body.glb`.
 """
 
 from __future__ import annotations

@@ -255,12 +255,9 @@ def head() -> FaceModel:
 
 
 if __name__ == "__main__":
-    import make_figures  # which imports this module
-
     made = head()
     made.save(TARGET)
     print(
         f"{TARGET}: {len(made.vertices)} vertices, {len(made.triangles)} triangles, {len(made.tables)} FAPs"
     )
     make_levels.main()
-    make_figures.main()
