@@ -70,6 +70,8 @@ class GlfwInput:
         glfw.set_drop_callback(window, self.on_drop)
         glfw.set_framebuffer_size_callback(window, lambda *_: on_input())
         glfw.set_window_refresh_callback(window, lambda *_: on_input())
+        if glfw.get_window_attrib(window, glfw.HOVERED):  # it may not move before it clicks
+            self.on_move(window, *glfw.get_cursor_pos(window))
 
     def on_key(self, window: Any, key: int, code: int, action: int, modifiers: int) -> None:
         """Handle a key that goes down, repeats, or goes up."""
