@@ -38,6 +38,7 @@ class Tuning:
     """Share, share of gaps, and most frames left out (see `Effort`) of the searches; the best first."""
     margin: float = 0.998  # share of the tolerance that searches fill: slopes only approximate the mesh
     max_failures: int = 3  # searches without a result after which a quantiser is given up
+    as_cheap: float = 1.02  # growth of bits within which searches are coded: they only estimate these
     worse: float = 1.1  # growth of bits at a finer quantiser above which still finer ones are not tried
     frames_searched: int = 18_000  # frames, times searches: longer streams are searched less often
     intra_bits: int = 2000  # weight of an I plane: differences take less than half of those of an exact plan
@@ -159,32 +160,37 @@ def _search(source: _Source, tolerance: Tolerance) -> Iterator[Plan]:
             continue
         found = []
         for frames, segment in segments:
-            best = _best(segment, basis, source.meter, quant, efforts)
-            if best is None:
+            results = _cheapest(segment, basis, source.meter, quant, efforts)
+            if not results:
                 break
-            found.append((frames, best))
+            found.append((frames, results))
         else:
             tried -= 1
-            yield _assemble(source, plan, segments, found, quant)
-            bits = sum(result.bits for _, result in found)
+            for k in range(max(len(results) for _, results in found)):
+                chosen = [(frames, results[min(k, len(results) - 1)]) for frames, results in found]
+                yield _assemble(source, plan, segments, chosen, quant)
+            bits = sum(results[0].bits for _, results in found)
             if bits > TUNING.worse * least:  # still finer ones take still more
                 return
             least = min(least, bits)
 
 
-def _best(
+def _cheapest(
     segment: Segment, basis: ErrorBasis, meter: DisplacementMeter, quant: int, efforts: int
-) -> Found | None:
-    """Return the cheapest of several searches; None if the quantiser is too coarse."""
-    best = None
+) -> list[Found]:
+    """Return the cheapest of several searches, and after it those that may take fewer bits when they are
+    coded; none if the quantiser is too coarse."""
+    results: list[Found] = []
     for number, (share, gap_share, most) in enumerate(TUNING.efforts[:efforts]):
-        if best is None and number >= TUNING.max_failures:
+        if not results and number >= TUNING.max_failures:
             break
-        below = best.bits if best is not None else np.inf
+        below = TUNING.as_cheap * min((result.bits for result in results), default=np.inf)
         effort = Effort(fap_steps() * quant, quant, share, gap_share, TUNING.margin, most)
         found = search_faps(segment, basis, meter, effort, below)
-        best = found if found.within else best
-    return best
+        if found.within:
+            results.append(found)
+    results.sort(key=lambda result: result.bits)
+    return [result for result in results if result.bits < TUNING.as_cheap * results[0].bits]
 
 
 def _segments(source: _Source, plan: Plan) -> list[tuple[slice, Segment]]:
