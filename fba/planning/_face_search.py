@@ -21,7 +21,7 @@ class Tuning:
     rounding: float = 1e-4  # share that rounding in 32 bits may take
     repaired_frames: int = 12  # frames on either side of a frame beyond the tolerance that are searched again
     hopeless_share: float = 0.2  # share of frames beyond the tolerance above which a quantiser is given up
-    max_repairs: int = 8  # searches around frames beyond the tolerance
+    max_repairs: int = 16  # searches around frames beyond the tolerance
 
 
 TUNING = Tuning()

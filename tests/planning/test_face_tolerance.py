@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -281,3 +282,13 @@ def test_short_real_faces(shared: Path) -> None:
         assert report.face is not None
         bits, seconds = bits + 8 * len(data), seconds + len(animation) / float(animation.rate)
     assert bits <= 1300 * seconds
+
+
+def test_a_captured_face_needs_many_repairs() -> None:
+    """With eight, the search came to nothing within the tolerance, and 10 kbit/s were sent."""
+    capture = fba.read(Path(str(files("fba") / "samples" / "talk.c3d")), rate=50)
+    animation = replace(capture, body=None)
+    data, report = encode_within_tolerance(animation, options=EncoderOptions(mark=False))
+    assert report.face is not None
+    assert 0.4e-3 < report.face.largest <= 0.5e-3
+    assert 8 * len(data) < 4200 * float(animation.duration)
