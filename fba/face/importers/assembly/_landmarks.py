@@ -334,10 +334,9 @@ def _mouth(
             within = (corner[0] - vertices[:, 0]) * sign > 0.015 * apart
             away = np.linalg.norm(vertices - corner + (0.035 * apart * sign, 0, 0), axis=1)
             points[inner] = vertices[int(np.where(within & front, away, np.inf).argmin())]
+            # a smile can move the skin beside the lips further than their corner
             if end is not None and (points[inner][0] - vertices[end, 0]) * sign > 0:
-                points[inner] = vertices[
-                    end
-                ]  # a smile can move the skin beside the lips further than their corner
+                points[inner] = vertices[end]
         points[inner] = on_edge.get(inner, points[inner])
         # the contours need skin between them: next to each other, one could not move without the other
         beyond = points[inner] + (TUNING.corner_width * apart * sign, 0.0, 0.25 * TUNING.corner_width * apart)
