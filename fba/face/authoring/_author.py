@@ -36,9 +36,8 @@ from fba.face.authoring.surface.attached_parts import (
     ATTACHED_DISTANCE,
     MAX_ATTACHED_SIZE,
     Anchors,
-    Roots,
     attach,
-    root_at,
+    attach_lashes,
 )
 from fba.face.authoring.surface.binding import Binding, bind_points, face_size, separate_lips
 from fba.face.authoring.surface.landmarks import LIP_CONTOURS, Landmarks, find_landmarks, weld_skin
@@ -163,11 +162,9 @@ def _check_size(parts: tuple[Part, ...]) -> None:
         )
 
 
-def _attach_parts(
-    marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, Eye]
-) -> dict[str, Anchors | Roots]:
+def _attach_parts(marks: Landmarks, parts: tuple[Part, ...], eyes: Mapping[str, Eye]) -> dict[str, Anchors]:
     """Return the attachment to the skin of each part that moves with it, by name; what is in an eye stays."""
-    result: dict[str, Anchors | Roots] = {}
+    result: dict[str, Anchors] = {}
     es = marks.fapu.ES * 1024
     margins = np.concatenate([marks.contour(f"{side} {lid} lid") for side, lid in LIDS.values()])
     for part in parts:
@@ -177,10 +174,10 @@ def _attach_parts(
             continue
         if part.kind == "other" and _is_in_eyes(part, eyes):
             continue
-        anchors: Anchors | Roots = attach(marks.surface, part)
+        anchors = attach(marks.surface, part)
         if part.kind == "lash" and len(margins):
-            roots = root_at(marks.surface, part, margins)
-            anchors = roots if np.median(roots.distance) < ATTACHED_DISTANCE * es else anchors
+            lashes = attach_lashes(marks.surface, part, margins)
+            anchors = lashes if np.median(lashes.distance) < ATTACHED_DISTANCE * es else anchors
         if np.median(anchors.distance) < ATTACHED_DISTANCE * es:
             result[part.name] = anchors
     return result
@@ -213,7 +210,7 @@ class _Authoring:
     marks: Landmarks
     limiter: Limiter
     eyes: dict[str, Eye]
-    anchors: dict[str, Anchors | Roots]
+    anchors: dict[str, Anchors]
     moves: dict[int, dict[str, Motion]] = field(default_factory=dict)
     turns: dict[int, list[FaceDefTransform]] = field(default_factory=dict)
     lost: dict[int, str] = field(default_factory=dict)

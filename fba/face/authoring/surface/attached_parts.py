@@ -27,6 +27,7 @@ class Anchors:
 
     surface: the skin. points: (V, 3), the part's vertices, metres. triangles: (V,), the skin's triangle that
     each hangs on; shares: (V, 3), barycentric coordinates in it. distance: (V,) from the skin, metres.
+    turning: whether vertices turn with their triangles.
     """
 
     surface: Surface
@@ -34,57 +35,48 @@ class Anchors:
     triangles: Intp
     shares: Float64
     distance: Float64
+    turning: bool = True
 
     def carry(self, motion: Motion) -> Motion:
-        """Return the part's motion for one of the surface: vertices move and turn with their triangles."""
+        """Return the part's motion for one of the surface: vertices go where their triangles go."""
         neutral = self.surface.vertices
         corners = self.surface.triangles[self.triangles]
-        moving = np.flatnonzero(self.surface.mask(motion.vertices)[corners].any(axis=1))
+        moved = self.surface.mask(motion.vertices)[corners] & (self.shares != 0)
+        moving = np.flatnonzero(moved.any(axis=1))
         corners, shares, points = corners[moving], self.shares[moving], self.points[moving]
         before = neutral[corners]
-        foot = (before * shares[:, :, None]).sum(axis=1)
-        arm = np.einsum("nij,ni->nj", _frames(before), points - foot)
+        arm = points - (before * shares[:, :, None]).sum(axis=1)
+        along = np.einsum("nij,ni->nj", _frames(before), arm)
         skin = np.zeros_like(neutral)
         shifts = np.zeros((len(motion.values), len(moving), 3))
         for k in range(len(motion.values)):
             skin[motion.vertices] = motion.shifts[k]
             after = before + skin[corners]
             foot = (after * shares[:, :, None]).sum(axis=1)
-            shifts[k] = foot + np.einsum("nij,nj->ni", _frames(after), arm) - points
+            if self.turning:
+                arm = np.einsum("nij,nj->ni", _frames(after), along)
+            shifts[k] = foot + arm - points
         shifts[motion.values == 0] = 0.0
         return Motion(motion.values, moving, shifts)
 
 
-@dataclass(frozen=True, eq=False)
-class Roots:
-    """The lashes of a part, which grow from the margins of lids; made by `root_at`.
+def attach_lashes(surface: Surface, part: Part, margins: Intp) -> Anchors:
+    """Return the attachment of a part's lashes, by their roots, to the nearest of the lids' margins.
 
-    surface: the skin. margin: (V,), its vertex at the root of each of the part's. distance: (V,) from that
-    to the root, metres.
+    They go where the margin goes and do not turn: a drawn lash can lie on skin that moves with the brow.
     """
-
-    surface: Surface
-    margin: Intp
-    distance: Float64
-
-    def carry(self, motion: Motion) -> Motion:
-        """Return the part's motion for one of the surface: vertices go where the margin goes.
-
-        A drawn lash can lie on skin that moves with the brow.
-        """
-        moving = np.flatnonzero(self.surface.mask(motion.vertices)[self.margin])
-        rows = np.searchsorted(motion.vertices, self.margin[moving])
-        return Motion(motion.values, moving, motion.shifts[:, rows])
-
-
-def root_at(surface: Surface, part: Part, margins: Intp) -> Roots:
-    """Return the roots of a part's lashes at the nearest of some vertices of the skin."""
     from scipy.spatial import cKDTree
 
     shape = weld_parts([part])
     away, nearest = cKDTree(surface.vertices[margins]).query(shape.vertices)
     root = hair_roots(shape, away)[shape.number]
-    return Roots(surface, margins[nearest[root]], away[root])
+    found = margins[nearest[root]]
+    triangle = np.zeros(len(surface.vertices), np.intp)
+    triangle[surface.triangles] = np.arange(len(surface.triangles))[:, None]
+    shares = (surface.triangles[triangle[found]] == found[:, None]).astype(np.float64)
+    return Anchors(
+        surface, part.vertices.astype(np.float64), triangle[found], shares, away[root], turning=False
+    )
 
 
 def attach(surface: Surface, part: Part) -> Anchors:
