@@ -195,7 +195,7 @@ def read_head(
         return head_of_model(FaceModel.default())
     form = sniff(path) if kind is None else kind
     name = Path(path).name
-    if form in ("makehuman", "fdp"):
+    if form in ("makehuman", "fdp", "shapes"):
         return head_of_model(import_model(path, kind=form, kinds=kinds, limits=limits), name)
     surface = read_head_surface(path, kind=form, points=points, up=up, kinds=kinds, limits=limits)
     if surface.origin == "of the model":

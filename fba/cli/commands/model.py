@@ -58,7 +58,7 @@ class _Mesh:
     points: Path | None = options.model_option(
         f"{POINT_FILES} with the feature points. Default: a file beside IN with the same name.", "--points"
     )
-    kind: Literal["makehuman", "gltf", "obj", "ply", "wfm", "fdp"] | None = option(
+    kind: Literal["makehuman", "gltf", "shapes", "obj", "ply", "wfm", "fdp"] | None = option(
         help="Kind of the mesh. Default: recognised from its content."
     )
     up: UpAxis = option(default="y", help="Vertical axis.")
@@ -207,11 +207,12 @@ def import_(
 ) -> None:
     """Turn a mesh into a face model that plays FAPs, and write it as glTF.
 
-    Reads MakeHuman's base mesh (its folder, or base.obj), glTF heads with ARKit's shapes, OBJ, PLY and
-    Candide meshes with feature points, and FDP files with their mesh. FAPs that the mesh
-    cannot show are listed with the reasons, and the errors that `fba model validate` finds, with a verdict:
-    good without errors, fair with up to ten, else poor, in one red line. The exit status is 0 in all
-    cases: `fba model validate` exits with 1 where there are errors. Look at the --sheet.
+    Reads MakeHuman's base mesh (its folder, or base.obj), heads with ARKit's shapes as glTF or as a folder
+    of OBJ files (neutral.obj, jawOpen.obj, ...), OBJ, PLY and Candide meshes with feature points, and FDP
+    files with their mesh. FAPs that the mesh cannot show are listed with the reasons, and the errors that
+    `fba model validate` finds, with a verdict: good without errors, fair with up to ten, else poor, in one
+    red line. The exit status is 0 in all cases: `fba model validate` exits with 1 where there are errors.
+    Look at the --sheet.
     """
     from fba.cli import model_text
     from fba.face import checks

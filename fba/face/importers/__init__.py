@@ -1,4 +1,4 @@
-"""Faces made by others: MakeHuman, FDP files, OBJ and PLY meshes, glTF heads with morph targets."""
+"""Faces made by others: MakeHuman, FDP files, OBJ and PLY meshes, heads with morph targets."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ __all__ = ["KINDS", "import_model", "sniff"]
 KINDS: Mapping[str, str] = {
     "makehuman": "MakeHuman's base mesh (base.obj or its folder)",
     "gltf": "glTF heads (.glb, .gltf)",
+    "shapes": "folders of OBJ files: one with 'neutral' in its name, and one for each shape (jawOpen.obj)",
     "obj": "Wavefront OBJ (.obj) with feature points",
     "ply": "PLY (.ply) with feature points",
     "wfm": "Candide wire frames (.wfm) with feature points",
@@ -44,11 +45,11 @@ def import_model(
 ) -> FaceModel:
     """Return a face model from a file that knows nothing of FAPs, with tables for all FAPs that it can serve.
 
-    path: a file, or MakeHuman's folder. kind: one of `KINDS`, by default recognised.
+    path: a file, MakeHuman's folder, or one of shapes. kind: one of `KINDS`, by default recognised.
     points: the feature points, as the path of a CSV, JSON or FDP file, an array (84, 3) in the file's
     unit with NaN where unknown, or a mapping from names to a position or a vertex number; by default they
     are read from a file of the mesh's name beside it (.points.csv, .points.json, .fdp), or located by the
-    shapes of a glTF head. unit: metres per unit, by default judged by the distance of the pupils. up: the
+    shapes of the head. unit: metres per unit, by default judged by the distance of the pupils. up: the
     file's vertical axis, "y" or "z". kinds: kind of part ("none" to leave it out) by the name of a group,
     object, mesh or material, where that name does not say. name: of the model. limits: of a glTF head, see
     `fba.Limits`.
@@ -87,6 +88,10 @@ def _import(form: str, options: ImportOptions, points: object) -> FaceModel:
         from fba.face.importers._gltf import import_gltf
 
         return import_gltf(options, points)
+    if form == "shapes":
+        from fba.face.importers._shape_folder import import_shape_folder
+
+        return import_shape_folder(options, points)
     from fba.face.importers._mesh import import_mesh
 
     return import_mesh(options, form, points)
@@ -102,10 +107,7 @@ def sniff(path: str | os.PathLike[str]) -> str:
     """Return the kind of a source, one of `KINDS`; ModelError, listing them, for anything else."""
     path = Path(path)
     if path.is_dir():
-        from fba.face.importers.makehuman.makehuman import base_file
-
-        base_file(path)
-        return "makehuman"
+        return _kind_of_folder(path)
     try:
         head = read_head(path)
     except FormatError as error:
@@ -116,6 +118,16 @@ def sniff(path: str | os.PathLike[str]) -> str:
         hint = recognition_hint(head)
         raise ModelError(f"{path}: no face can be read from this file{hint}. Files that can be read: {reads}")
     return kind
+
+
+def _kind_of_folder(path: Path) -> str:
+    from fba.face.importers._shape_folder import neutral_file
+    from fba.face.importers.makehuman.makehuman import base_file
+
+    if neutral_file(path) is not None:
+        return "shapes"
+    base_file(path)
+    return "makehuman"
 
 
 def _kind_of_content(head: bytes, path: Path) -> str | None:

@@ -19,9 +19,10 @@ from fba.face.authoring.surface.binding import bind_points, face_size, separate_
 from fba.face.authoring.surface.landmarks import weld_skin
 from fba.face.feature_points import names
 from fba.face.importers import sniff
-from fba.face.importers._gltf import POINT_FILES as GLTF_POINT_FILES
-from fba.face.importers._gltf import gltf_pieces, locate
+from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers._mesh import POINT_FILES, READERS, polygon_pieces, read_materials
+from fba.face.importers._shaped import POINT_FILES as SHAPED_POINT_FILES
+from fba.face.importers._shaped import locate
 from fba.face.importers.assembly._landmarks import find_eye_points
 from fba.face.importers.assembly._pieces import DROPPED, assemble, check_kinds, kind_of
 from fba.face.importers.assembly._polygon_parts import Piece
@@ -32,6 +33,7 @@ from fba.limits import DEFAULT_LIMITS, Limits
 
 OTHERS = {
     "makehuman": "MakeHuman's base mesh has its feature points: import it as it is",
+    "shapes": "the points of a face with shapes are found by these; give its neutral mesh to place others",
     "fdp": "an FDP file has its own feature points; give its mesh (.obj, .ply, .wfm) to place others",
 }
 """Kinds of files whose points need no placing, and why."""
@@ -89,7 +91,7 @@ def read_head_surface(
     if form == "gltf":
         pieces, has_extension = gltf_pieces(path, limits)
         vertices = np.concatenate([piece.part.vertices for piece in pieces]).astype(np.float64)
-        beside = GLTF_POINT_FILES
+        beside = SHAPED_POINT_FILES
         own = FaceModel.load(path, limits=limits) if has_extension else None
     else:
         polygons = READERS[form](path)

@@ -26,11 +26,15 @@ REST_WEIGHT = 1.0
 """Weight of the other points."""
 ACROSS_WEIGHT = 0.5
 """Weight of the points that are to move, across the motion."""
-RIDGE = 0.05
-"""Regularisation: a shape at weight 1 costs as much as 5 % of the motion at another point."""
+RIDGE = 0.1
+"""Regularisation: a shape at weight 1 costs as much as 10 % of the motion at another point."""
+TOTAL = 0.3
+"""Regularisation: a sum of the weights of 1 costs 30 % of it, so that few shapes are mixed."""
+MOST_DETAIL = 1.5
+"""Shapes may add to what the mesh's own tables move at most this many times the motion of these."""
 MOST_WEIGHT = 1.25
 """A shape is used up to this weight for a typical value of the FAP."""
-MIN_MEAN_SHARE = 0.5
+MIN_MEAN_SHARE = 0.45
 """Share of their target by which shapes must move a group's points on average."""
 MIN_SHARE = 0.25
 """Share of its target by which shapes must move each point of a group."""
@@ -42,8 +46,13 @@ GROUPS = (
 )  # fmt: skip
 """FAPs that sculptors move together: a shape raises a whole brow, a whole lip. Inner lips follow from
 the mesh, as shapes always move both contours."""
-REGIONS = ((*range(31, 39),), (*range(39, 43),), (*range(4, 14), 16, 17, *range(51, 61)), (*range(61, 65),))
-"""FAPs that move the same area of skin."""
+REGIONS = {
+    "brow": (*range(31, 39),),
+    "cheek": (*range(39, 43),),
+    "mouth": (*range(4, 14), 16, 17, *range(51, 61)),
+    "nose": (*range(61, 65),),
+}
+"""FAPs that move the same area of skin, by the word with which ARKit's names of its shapes begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +66,7 @@ class Mixer:
     def points(self) -> dict[str, int]:
         """The P feature points of the skin that FAPs move linearly, and the FAP that gives their weights."""
         points: dict[str, int] = {}
-        for fap in (fap for region in REGIONS for fap in region):
+        for fap in (fap for region in REGIONS.values() for fap in region):
             names = faps()[fap - 1].feature_points
             if len(names) == 1 and fap in self.base.table_of and self.base.bound[point_rows()[names[0]]] >= 0:
                 points.setdefault(names[0], fap)
@@ -100,9 +109,10 @@ class Mixer:
             solved = self._solve_weights(group, sign)
             if solved is not None:
                 step = self._correct_at_points(group, self.shapes.mix(solved))
-                plain = sum(
-                    first_steps(self.base, fap, sign) for fap in self._points_moved_together(group).values()
-                )
+                together = self._points_moved_together(group).values()
+                plain = np.sum([first_steps(self.base, fap, sign) for fap in together], axis=0)
+                if _largest(step - plain) > MOST_DETAIL * _largest(plain):
+                    continue  # shapes that nearly cancel each other at the points
                 details[sign] = step - plain
                 halves = zip(self.shapes.halves, solved, strict=True)
                 used |= {half.shape for half, weight in halves if weight * self._value(group[0]) > 0.02}
@@ -184,11 +194,13 @@ class Mixer:
         weight = np.full(target.shape, REST_WEIGHT)
         weight[own] = np.where(np.abs(target[own]) > 0, MOVING_WEIGHT, ACROSS_WEIGHT)
         weight /= length.max()
-        halves = len(self.shapes.halves)
-        system = (self.moves * weight).reshape(halves, -1).T
-        solution = lsq_linear(
-            np.concatenate([system, RIDGE * np.eye(halves)]),
-            np.concatenate([(target * weight).reshape(-1), np.zeros(halves)]),
+        word = next(word for word, region in REGIONS.items() if group[0] in region)
+        fitting = np.flatnonzero([half.shape.startswith(word) for half in self.shapes.halves])
+        system = (self.moves[fitting] * weight).reshape(len(fitting), -1).T
+        solution = np.zeros(len(self.shapes.halves))
+        solution[fitting] = lsq_linear(
+            np.concatenate([system, RIDGE * np.eye(len(fitting)), TOTAL * np.ones((1, len(fitting)))]),
+            np.concatenate([(target * weight).reshape(-1), np.zeros(len(fitting) + 1)]),
             bounds=(0.0, MOST_WEIGHT),
         ).x
         solution[solution < 1e-3] = 0.0
@@ -201,7 +213,7 @@ class Mixer:
 
     def _correct_at_points(self, group: tuple[int, ...], step: Float64) -> Float64:
         """Return (V, 3) a group's step, faded out outside its region and corrected to be exact at points."""
-        region = next(region for region in REGIONS if group[0] in region)
+        region = next(region for region in REGIONS.values() if group[0] in region)
         inside = [number for number, owner in enumerate(self.points.values()) if owner in region]
         step = step * smoothstep(np.abs(self.weights[:, inside]).max(axis=1) / FULL_WEIGHT)[:, None]
         rest, *_ = np.linalg.lstsq(
@@ -222,6 +234,11 @@ class Mixer:
             return None
         step = field * self.base.fapu[entry.unit] / along
         return fold_limited_tables(self.shapes, fap, step, step)
+
+
+def _largest(field: Float64) -> float:
+    """Return the length of the largest of some displacements (V, 3)."""
+    return float(np.linalg.norm(field, axis=1).max())
 
 
 def first_steps(model: FaceModel, fap: int, sign: float) -> Float64:

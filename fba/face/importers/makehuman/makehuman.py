@@ -105,7 +105,10 @@ def base_file(path: str | os.PathLike[str]) -> Path:
         if (path / name).is_file():
             return path / name
     if path.is_dir():
-        raise ModelError(f"{path}: there is no base.obj in this folder; give MakeHuman's base mesh")
+        raise ModelError(
+            f"{path}: this folder holds neither MakeHuman's base.obj nor a face as OBJ files, one with "
+            "'neutral' in its name and one for each shape, such as jawOpen.obj"
+        )
     return path
 
 
