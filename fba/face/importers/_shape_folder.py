@@ -43,9 +43,9 @@ def import_shape_folder(options: ImportOptions, points: object = None) -> FaceMo
     same order. points: as `import_model`. Raises ModelError as `import_model`.
     """
     folder = Path(options.path)
-    neutral = neutral_file(folder)
+    neutral = neutral_file(folder) if folder.is_dir() else None
     if neutral is None:
-        raise ModelError(f"{folder}: no .obj file has 'neutral' in its name")
+        raise ModelError(f"{folder}: is no folder with an .obj file that has 'neutral' in its name")
     pieces = match_sides(_read_pieces(neutral, [path for path in _meshes(folder) if path != neutral]))
     return import_shaped(pieces, replace(options, path=neutral), points)
 

@@ -8,7 +8,7 @@ import pytest
 from fba.face.authoring import author
 from fba.face.deform._deformer import Deformer
 from fba.face.eyeball import eyeballs, fit_eyeball, flat_width
-from fba.face.importers._gltf import split_sides
+from fba.face.importers._shaped import match_sides
 from fba.face.importers.assembly._definitions import define_by_shapes, named_shapes
 from fba.face.importers.assembly._landmarks import find_eyes
 from fba.face.importers.assembly._outlines import mouth_points
@@ -77,7 +77,7 @@ def test_shapes_of_both_sides_become_shapes_of_each() -> None:
     part = Part("skin", "skin", vertices, np.array([(0, 1, 2), (1, 2, 3)], dtype=np.int32))
     blink = np.tile(np.array([0, -1, 0], dtype=np.float32), (4, 1))
     own = {"mouthSmile": blink, "mouthSmileLeft": blink * 2}
-    (piece,) = split_sides([Piece(part, morphs={"Fcl_EYE_Close": blink, **own})])
+    (piece,) = match_sides([Piece(part, morphs={"Fcl_EYE_Close": blink, **own})])
     # the middle is that of what moves, not of the file
     assert piece.morphs["eyeBlinkLeft"][:, 1].tolist() == [0, 0, -1, -1]
     assert piece.morphs["eyeBlinkRight"][:, 1].tolist() == [-1, -1, 0, 0]

@@ -16,7 +16,8 @@ from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
 from fba.face.feature_points import MIRRORED, names
 from fba.face.importers import import_model
-from fba.face.importers._gltf import gltf_pieces, locate
+from fba.face.importers._gltf import gltf_pieces
+from fba.face.importers._shaped import locate
 from fba.face.importers.assembly._symmetry import MIRRORED_LIDS
 from fba.face.importers.assembly.model import ImportOptions
 from fba.face.model import FaceModel

@@ -7,7 +7,7 @@ import pytest
 
 from fba.errors import FbaWarning, ModelError, OptionError
 from fba.face.deform._deformer import Deformer
-from fba.face.importers import import_model
+from fba.face.importers import KINDS, import_model
 from fba.face.importers.assembly._pieces import guess_kind
 from fba.face.importers.assembly.model import metres_per_unit
 from fba.face.model import FaceModel
@@ -236,7 +236,7 @@ def test_unknown_files_are_told_what_is_read(tmp_path: Path, name: str, content:
 
 
 def test_folders_empty_files_and_wrong_options(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match=r"no base\.obj in this folder"):
+    with pytest.raises(ModelError, match=r"neither MakeHuman.s base\.obj nor a face as OBJ"):
         import_model(tmp_path)
     (tmp_path / "a.obj").write_bytes(b"")
     with pytest.raises(ModelError, match="empty"):
@@ -247,7 +247,7 @@ def test_folders_empty_files_and_wrong_options(tmp_path: Path) -> None:
         import_model(tmp_path / "a.obj", kind="fbx")
 
 
-@pytest.mark.parametrize("kind", ["gltf", "obj", "ply", "wfm", "fdp", "makehuman"])
+@pytest.mark.parametrize("kind", [*KINDS])
 def test_every_reader_refuses_foreign_bytes(tmp_path: Path, kind: str) -> None:
     rng = np.random.default_rng(7)
     for number, start in enumerate(

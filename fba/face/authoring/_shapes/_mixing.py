@@ -196,6 +196,8 @@ class Mixer:
         weight /= length.max()
         word = next(word for word, region in REGIONS.items() if group[0] in region)
         fitting = np.flatnonzero([half.shape.startswith(word) for half in self.shapes.halves])
+        if not len(fitting):
+            return None
         system = (self.moves[fitting] * weight).reshape(len(fitting), -1).T
         solution = np.zeros(len(self.shapes.halves))
         solution[fitting] = lsq_linear(
