@@ -85,6 +85,17 @@ def test_shapes_of_both_sides_become_shapes_of_each() -> None:
     assert "mouthSmileRight" not in piece.morphs
 
 
+def test_shapes_of_each_side_become_one_of_both() -> None:
+    vertices = np.array([(x, 0, 0) for x in (0.1, 0.2, 0.3)], dtype=np.float32)
+    part = Part("skin", "skin", vertices, np.array([(0, 1, 2)], dtype=np.int32))
+    left, right = np.zeros((2, 3, 3), dtype=np.float32)
+    left[2], right[0] = (0.2, 0, 0), (-0.1, 0, 0)
+    morphs = {"cheekPuff_L": left, "cheekPuff_R": right, "browInnerUp_L": left, "noseSneer_R": right}
+    (piece,) = match_sides([Piece(part, morphs=morphs)])
+    np.testing.assert_array_equal(piece.morphs["cheekPuff"], left + right)
+    assert set(piece.morphs) == {*morphs, "cheekPuff"}  # one half is no whole
+
+
 def slit_sheet() -> tuple[Part, np.ndarray]:
     """A sheet of 21 x 21 vertices, 5 mm apart, with a slit from x = -2 to 3 cm; how far each falls."""
     x, y = np.meshgrid(np.arange(-10, 11) * 0.005, np.arange(-10, 11) * 0.005)

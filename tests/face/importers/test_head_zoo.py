@@ -5,6 +5,7 @@ The feature points of all are found; only one is imported in full. With FBA_ALL_
 
 import itertools
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,12 @@ from fba.face.feature_points import MIRRORED, names
 from fba.face.importers import import_model
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers._shaped import locate
+from fba.face.importers.assembly._polygon_parts import Piece
 from fba.face.importers.assembly._symmetry import MIRRORED_LIDS
 from fba.face.importers.assembly.model import ImportOptions
 from fba.face.model import FaceModel
 from fba.parameters import faps, point_rows
-from mesh_files import write_points
+from mesh_files import write_obj, write_points
 from zoo_heads import ACTIONS, MADE_UP, MAKERS, Maker, original, write
 
 ALL = pytest.mark.skipif(
@@ -161,6 +163,50 @@ def test_a_head_of_many_surfaces_moves_as_the_standard_says(tmp_path: Path) -> N
     assert [str(finding) for finding in check_faps(model) if finding.severity == "error"] == []
     check_motions(model)
     check_symmetry(model)
+
+
+def write_folder(folder: Path, pieces: list[Piece]) -> None:
+    """Write a neutral mesh and one for each shape, named as by a face model of many scans."""
+    folder.mkdir()
+    shapes = {name for piece in pieces for name in piece.morphs}
+    for name in ("generic_neutral_mesh", *shapes):
+        parts = [
+            replace(piece.part, vertices=piece.part.vertices + piece.morphs.get(name, np.float32(0)))
+            for piece in pieces
+        ]
+        write_obj(folder / f"{name}.obj", parts)
+
+
+def test_a_folder_of_shapes_moves_as_the_same_head_in_one_file(tmp_path: Path) -> None:
+    path = write(MAKERS[0], "grid", tmp_path / "head.glb")
+    pieces, _ = gltf_pieces(path)
+    write_folder(tmp_path / "head", pieces)
+    whole, folder = import_model(path), import_model(tmp_path / "head")
+    np.testing.assert_allclose(folder.points, whole.points, atol=1e-5)
+    assert folder.lost == whole.lost
+    assert folder.notes["shapes"] == whole.notes["shapes"]
+    values = np.full(68, 40.0)
+    np.testing.assert_allclose(
+        Deformer(folder).feature_points(values), Deformer(whole).feature_points(values), atol=2e-5
+    )
+
+
+@pytest.mark.parametrize(
+    ("files", "message"),
+    [
+        ({"neutral": 4, "jawOpen": 3}, "jawOpen.obj: has 3 vertices, but neutral.obj 4; shapes must be"),
+        ({"neutral": 4, "Neutral_old": 4}, "one file must be the neutral face, .* Neutral_old.obj, neutral"),
+        ({"jawOpen": 4}, "neither MakeHuman's base.obj nor a face as OBJ files, one with 'neutral'"),
+        ({"neutral": 0}, "neutral.obj: .*empty"),
+        ({"neutral": 4}, "eye and the right eye .* not found"),
+    ],
+)
+def test_a_folder_that_is_no_face_is_refused(tmp_path: Path, files: dict[str, int], message: str) -> None:
+    for name, count in files.items():
+        corners = "".join(f"v {k} {k * k} 0\n" for k in range(count))
+        (tmp_path / f"{name}.obj").write_text(corners + "f 1 2 3\n" * bool(count))
+    with pytest.raises(ModelError, match=message):
+        import_model(tmp_path)
 
 
 @ALL
