@@ -44,6 +44,7 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
     assert eye.colours is not None
     offset = ORIGIN + np.array([0.0, figure.EYE_LEVEL, 0.0])
     moved = reshape(looks, slim_arms(looks, body) - offset) + offset
+    moved, joints = in_build(looks, body, moved)
     tints = {"shirt": looks.shirt, "trousers": looks.trousers, "shoes": looks.shoes}
     tints["skin"] = tints["neck"] = linear(looks.neck) / linear(ALEX.neck)
     tints["hair"] = np.mean([linear(c) for c in looks.hair.colours], axis=0) / np.mean(
@@ -61,8 +62,37 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
         "picture": np.frombuffer(skin.material.texture, np.uint8),
         "body": np.array(shape_key(body.parts)),
         "body_moves": steps(moved - body.vertices),
+        "body_joints": (joints - body.bind[:, :3, 3]).astype(np.float32),
+        "body_centres": hanging(body, joints).astype(np.float32),
         "body_tints": np.array([tints[part.name] for part in body.parts], np.float32),
     }
+
+
+def in_build(looks: Looks, body: BodyModel, moved: Float64) -> tuple[Float64, Float64]:
+    """Return vertices (V, 3) and joints (J, 3) of the body, as modelled, in the build of a figure.
+
+    moved: the vertices in the first figure's build.
+    """
+    joints = body.bind[:, :3, 3]
+    if looks.build is None:
+        return moved, joints
+    arms = [body.skeleton.number(f"{side}_shoulder") for side in "lr"]
+    share = carried_share(body, arms[0]) + carried_share(body, arms[1])
+    of_arm = np.isin(np.arange(len(joints)), [n for arm in arms for n in body.skeleton.descendants(arm)])
+    return tuple(
+        looks.build.move(points, carried, joints[arms])
+        for points, carried in ((moved, share), (joints, of_arm.astype(np.float64)))
+    )
+
+
+def hanging(body: BodyModel, joints: Float64) -> Float64:
+    """Return (J, 3), where joints (J, 3), as modelled, are in the default posture."""
+    centres = joints.copy()
+    for number, above in enumerate(body.skeleton.parents):
+        if above >= 0:
+            turn = body.bind[above, :3, :3]
+            centres[number] = centres[above] + turn.T @ (joints[number] - joints[above])
+    return centres
 
 
 def slim_arms(looks: Looks, body: BodyModel) -> Float64:
