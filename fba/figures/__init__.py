@@ -81,9 +81,8 @@ def body(name: str = "alex") -> BodyModel:
         start = person.starts[part.name]
         placed = rebuild_part(cast("Part", part), moved[start : start + len(part.vertices)])
         parts.append(_tint(cast("BodyPart", placed), tint))
-    bind = person.bind.copy()
-    bind[:, :3, 3] += data["body_joints"]
-    eyes = cast("Float64", person.eyes) + data["body_joints"][person.skeleton.number(SKULL)]
+    bind, skull = data["body_bind"], person.skeleton.number(SKULL)
+    eyes = cast("Float64", person.eyes) + (bind - person.bind)[skull, :3, 3]
     skeleton = replace(person.skeleton, centres=data["body_centres"].astype(np.float64))
     return replace(person, parts=tuple(parts), skeleton=skeleton, bind=bind, eyes=eyes, name=name)
 

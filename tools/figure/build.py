@@ -11,6 +11,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from fba.arrays import Float64
+from fba.body import Skeleton
+from fba.rotations import axis_matrices
 from fba.sampling import smoothstep
 
 BETWEEN = (0.04, 0.15)
@@ -31,7 +33,8 @@ class Build:
     trunk: rows of a height and of what is added there to half the width, to the front and to the back.
     bust: how far it stands out. bust_at: how far from the midline, and its height; bust_size: how far it
     reaches sideways, up and down. shoulders: by which each is moved in. slope: by which it is lower. shorter:
-    of the trunk. arms: their length, relative to the first figure's.
+    of the trunk. arms: their length, relative to the first figure's. carried: degrees by which upper arms and
+    forearms hang outwards, past wider hips.
     """
 
     trunk: tuple[tuple[float, float, float, float], ...]
@@ -42,6 +45,7 @@ class Build:
     slope: float
     shorter: float
     arms: float
+    carried: tuple[float, float]
 
     def move(self, p: Float64, arm: Float64, shoulders: Float64) -> Float64:
         """Return points p (N, 3), as modelled, in this build.
@@ -74,3 +78,11 @@ class Build:
         mound = np.exp(-(((x - self.bust_at[0]) / self.bust_size[0]) ** 2) - (up / reach) ** 2)
         moved[:, 2] = ahead * (front + self.bust * mound) - behind * back
         return moved
+
+    def turn_arms(self, bind: Float64, skeleton: Skeleton) -> None:
+        """Turn bind matrices (J, 4, 4), in place, so that the arms hang as they are carried."""
+        for side, sign in (("l", 1.0), ("r", -1.0)):
+            for joint, degrees in zip(("shoulder", "elbow"), self.carried, strict=True):
+                back = axis_matrices(2, np.radians(-sign * degrees))
+                below = skeleton.descendants(skeleton.number(f"{side}_{joint}"))
+                bind[below, :3, :3] = bind[below, :3, :3] @ back
