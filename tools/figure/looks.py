@@ -91,7 +91,7 @@ RUTH = Looks(
     skin=(128, 86, 66), blush=(132, 76, 62), socket=(94, 60, 48), neck=(120, 80, 61),
     waterline=(150, 98, 86), caruncle=(186, 118, 108), lip=(132, 78, 69), lip_line=(84, 45, 40),
     freckle=(92, 58, 42), scalp=(84, 66, 58), brow=(66, 56, 52), brow_height=0.72, lines=1.0, gloss=0.75,
-    girth=0.86, muscles=0.25,
+    girth=0.86, muscles=0.50,
     iris=((0.080, 0.040, 0.018), (0.038, 0.021, 0.012)),
     shirt=(3.0, 0.62, 0.45), trousers=(1.1, 0.75, 0.60), shoes=(0.8, 0.55, 0.45),
     build=Build(
