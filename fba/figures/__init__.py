@@ -23,7 +23,7 @@ from fba.face.calibration import rebuild_part, reshape
 from fba.face.model import shape_key
 
 if TYPE_CHECKING:
-    from fba.arrays import Floating, Float64
+    from fba.arrays import Float64, Floating
     from fba.body import BodyModel, BodyPart
     from fba.face import FaceModel, Part
 

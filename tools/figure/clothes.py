@@ -32,7 +32,7 @@ TROUSERS = np.array([0.054, 0.059, 0.070])
 INSIDE = 1.7
 """Brightness of the inside of clothes and of their rims, relative to the cloth: little light gets there."""
 HEM, RISE, WAIST = 0.910, 0.012, 0.982
-"""Heights of the shirt's hem in front and behind, how much higher it is at the sides, and of the waistband."""
+"""Height of the shirt's hem in front and behind, how much higher it is at the sides, and the waistband's."""
 DRAPE = ((4.0, 0.4, 0.0036), (7.0, 1.9, 0.0016))
 """Waves of the shirt about its hem: how many on half a turn, where they begin in radians, and metres."""
 TURN_UP = (0.073, 0.45)

@@ -146,8 +146,9 @@ def _between_fingers(piece: Piece, bones: rig.Rig) -> Float64:
             for beside in chains[max(number - 1, 0) : number] + chains[number + 1 : number + 2]:
                 line = np.concatenate([bones.bind[beside, :3, 3], bones.bind[beside[-1:], :3, 3]])
                 line[3] += line[2] - line[1]  # towards the fingertip
-                points = np.concatenate([line[k] + np.linspace(0, 1, 8)[:, None] * (line[k + 1] - line[k])
-                                         for k in range(3)])
+                points = np.concatenate(
+                    [line[k] + np.linspace(0, 1, 8)[:, None] * (line[k + 1] - line[k]) for k in range(3)]
+                )
                 away, row = cKDTree(points).query(piece.vertices[own])
                 towards = (points[row] - piece.vertices[own]) / away[:, None]
                 facing = smoothstep(((piece.normals[own] * towards).sum(axis=1) - 0.15) / 0.75)

@@ -256,6 +256,8 @@ def swing_arms(writer: Writer, plan: Plan, phase: Float64) -> None:
         writer.turn(f"{letter}_wrist", 2, np.full(phase.shape, wrist))
         # the hand trails behind the arm, which is fastest halfway
         trail = np.radians(character.arms.trail) * np.clip(plan.stride_ratio, 0.0, 1.4)
-        writer.turn(f"{letter}_wrist", 0, trail * cosine_wave(KNOTS, arm_phase - 0.25 - _LATE, plan.interpolation))
+        writer.turn(
+            f"{letter}_wrist", 0, trail * cosine_wave(KNOTS, arm_phase - 0.25 - _LATE, plan.interpolation)
+        )
         inwards = -side.sign * np.radians(character.arms.pronation)
         writer.turn(f"{letter}_elbow", 1, np.full(phase.shape, inwards))
