@@ -17,9 +17,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "docs"))
+sys.path.insert(0, str(ROOT / "docs" / "pictures"))
 
-import make_gait_curves as curves  # noqa: E402
+import gait_curves as curves  # noqa: E402
 
 from fba.body import BapSolver, Skeleton, gait  # noqa: E402
 

@@ -1,7 +1,8 @@
 """The figures that come with the library, by name: `fba.figures.face("ruth")`, `fba.figures.body("ruth")`.
 
 The first is the built-in head and person. Of the others, a file holds what differs (`tools/figure` makes it):
-positions, the picture of the skin, colours. They share triangles, weights and FaceDefTables with the first.
+positions of vertices and joints, the picture of the skin, colours. They share triangles, weights and
+FaceDefTables with the first.
 """
 
 from __future__ import annotations
@@ -15,13 +16,14 @@ from typing import TYPE_CHECKING, TypeVar, cast
 import numpy as np
 
 from fba.body.builtin import default as default_body
+from fba.body.head_attachment import SKULL
 from fba.errors import ModelError
 from fba.face.builtin import default as default_face
 from fba.face.calibration import rebuild_part, reshape
 from fba.face.model import shape_key
 
 if TYPE_CHECKING:
-    from fba.arrays import Floating
+    from fba.arrays import Float64, Floating
     from fba.body import BodyModel, BodyPart
     from fba.face import FaceModel, Part
 
@@ -79,7 +81,10 @@ def body(name: str = "alex") -> BodyModel:
         start = person.starts[part.name]
         placed = rebuild_part(cast("Part", part), moved[start : start + len(part.vertices)])
         parts.append(_tint(cast("BodyPart", placed), tint))
-    return replace(person, parts=tuple(parts), name=name)
+    bind, skull = data["body_bind"], person.skeleton.number(SKULL)
+    eyes = cast("Float64", person.eyes) + (bind - person.bind)[skull, :3, 3]
+    skeleton = replace(person.skeleton, centres=data["body_centres"].astype(np.float64))
+    return replace(person, parts=tuple(parts), skeleton=skeleton, bind=bind, eyes=eyes, name=name)
 
 
 def _read(name: str) -> dict[str, np.ndarray]:

@@ -16,25 +16,27 @@ from fba.sampling import smoothstep
 
 FORMS = (
     # beyond the elbow, around; metres and degrees over which it fades; its height, millimetres
-    (-0.110, -10, 0.050, 40, 3.5),  # biceps
-    (-0.030, 58, 0.034, 22, -2.5),  # groove beside it
-    (-0.125, 165, 0.050, 35, 3.5),  # triceps
-    (-0.048, 178, 0.028, 28, -3.5),  # its tendon
-    (-0.004, 178, 0.015, 24, 6.5),  # point of the elbow
-    (0.002, 138, 0.017, 18, -3.5),  # hollows on both sides of it
-    (0.000, -142, 0.017, 18, -3.0),
-    (-0.014, -100, 0.014, 24, 4.0),  # inner and outer knob above the joint
-    (-0.008, 108, 0.014, 20, 2.0),
-    (0.006, -5, 0.019, 34, -4.0),  # pit of the elbow
-    (0.052, 52, 0.048, 36, 6.5),  # brachioradialis
-    (-0.005, 62, 0.034, 26, 3.0),
-    (0.075, 118, 0.048, 26, 3.0),  # extensors
-    (0.062, -78, 0.052, 40, 5.0),  # flexors
-    (0.085, 160, 0.065, 18, -2.5),  # along the ulna
-    (0.195, 0, 0.045, 999, -2.5),  # forearm before the wrist
-    (0.252, 138, 0.011, 30, 4.0),  # head of the ulna
+    (-0.115, -10, 0.045, 42, 5.5),  # biceps
+    (-0.045, 62, 0.050, 20, -4.0),  # groove beside it
+    (-0.130, 92, 0.040, 34, 2.5),  # deltoid's end
+    (-0.125, 160, 0.046, 36, 5.5),  # triceps
+    (-0.045, 178, 0.026, 28, -4.5),  # its tendon
+    (-0.003, 178, 0.014, 22, 8.0),  # point of the elbow
+    (0.002, 138, 0.017, 18, -4.0),  # hollows on both sides of it
+    (0.000, -142, 0.017, 18, -3.5),
+    (-0.012, -98, 0.015, 24, 5.5),  # inner and outer knob above the joint
+    (-0.008, 108, 0.014, 20, 2.5),
+    (0.004, -5, 0.020, 36, -5.0),  # pit of the elbow
+    (0.055, 55, 0.044, 36, 9.0),  # brachioradialis
+    (-0.008, 62, 0.030, 26, 3.0),
+    (0.075, 120, 0.044, 26, 4.5),  # extensors
+    (0.062, -78, 0.048, 42, 7.5),  # flexors
+    (0.085, 160, 0.065, 16, -3.5),  # along the ulna
+    (0.185, 0, 0.045, 999, -3.0),  # forearm before the wrist
+    (0.222, 90, 0.034, 48, -2.4),  # flat at the wrist, on both sides
+    (0.226, -90, 0.034, 52, -3.0),
+    (0.250, 136, 0.014, 30, 3.0),  # head of the ulna
     (0.246, 20, 0.014, 30, 1.5),  # end of the radius
-    (0.236, -90, 0.025, 50, -1.5),
 )
 CREASES = (
     # beyond the elbow, around; half its length in degrees; millimetres and depth

@@ -31,7 +31,10 @@ SHIRT = np.array([0.052, 0.088, 0.125])
 TROUSERS = np.array([0.054, 0.059, 0.070])
 INSIDE = 1.7
 """Brightness of the inside of clothes and of their rims, relative to the cloth: little light gets there."""
-HEM, WAIST = 0.918, 0.982
+HEM, RISE, WAIST = 0.910, 0.012, 0.982
+"""Height of the shirt's hem in front and behind, how much higher it is at the sides, and the waistband's."""
+DRAPE = ((4.0, 0.4, 0.0036), (7.0, 1.9, 0.0016))
+"""Waves of the shirt about its hem: how many on half a turn, where they begin in radians, and metres."""
 TURN_UP = (0.073, 0.45)
 """Height of the trousers' hem below the middle of the ankle, and how it rises to the front."""
 SLEEVE = 0.62
@@ -39,6 +42,8 @@ SLEEVE = 0.62
 SHOULDER, ELBOW = np.array([0.161, 1.401, -0.063]), np.array([0.342, 1.176, -0.051])
 LEG = -0.10
 """z of the middle of the ankle."""
+BELLY = -0.045
+"""z of the upright axis of the belly."""
 AXIS = -0.0137
 """z of the vertical axis of the neck."""
 NECKLINE = (
@@ -112,13 +117,26 @@ def height_above_hem(p: Float64) -> Float64:
     return p[:, 1] - TURN_UP[0] - TURN_UP[1] * np.clip(p[:, 2] - LEG, -0.05, 0.09)
 
 
+def height_above_shirt_hem(p: Float64) -> Float64:
+    """Return (N,) metres by which points (N, 3) are above the shirt's hem."""
+    x, z = p[:, 0], p[:, 2] - BELLY
+    return p[:, 1] - HEM - RISE * x**2 / np.maximum(x**2 + z**2, 1e-9)
+
+
+def _drape(p: Float64) -> Float64:
+    """Return (N,) metres by which a shirt that hangs stands off more or less at points (N, 3)."""
+    turn = np.arctan2(np.abs(p[:, 0]), p[:, 2] - BELLY)
+    waves = sum(high * np.cos(number * turn + start) for number, start, high in DRAPE)
+    return waves * smoothstep((HEM + 0.16 - p[:, 1]) / 0.14)
+
+
 def make_shirt(body: Body) -> Garment:
     """Return a T-shirt."""
     p = body.person.vertices
     arms = body.person.arms > 0.5
 
     def edge_distance(points: Float64, kind: Float64) -> Float64:
-        ends = length_inside_sleeve(points), depth_below_collar(points), points[:, 1] - HEM
+        ends = length_inside_sleeve(points), depth_below_collar(points), height_above_shirt_hem(points)
         return np.choose(kind.astype(int), ends)
 
     # On an arm only the sleeve's plane counts: the hem's and the collar's would cut it, and it the trunk.
@@ -128,11 +146,12 @@ def make_shirt(body: Body) -> Garment:
     below = np.maximum(-vertex_normals(p, body.person.triangles)[:, 1], 0.0)  # cloth hangs under an arm
     thick = (
         0.0042
-        + 0.0075 * loose * ~arms
+        + (0.0075 * loose + _drape(p)) * ~arms
         + 0.0026 * collar  # a bent neck must stay below it
-        + (0.0085 + 0.008 * below) * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
+        + (0.0040 + 0.0055 * below) * arms * smoothstep((0.13 - length_inside_sleeve(p)) / 0.13)
     )
-    return _make_garment(body, edge_distance, kind, thick, 0.5 + 0.4 * loose, 14, SHIRT, 0.014)
+    slack = 0.5 + np.where(arms, 0.3, 0.4 * loose)
+    return _make_garment(body, edge_distance, kind, thick, slack, 14, SHIRT, 0.014)
 
 
 def make_trousers(body: Body) -> Garment:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from clothes import (
     ELBOW,
-    HEM,
     SHOULDER,
     Garment,
     depth_below_collar,
     height_above_hem,
+    height_above_shirt_hem,
     length_inside_sleeve,
 )
 from hair import noise
@@ -307,7 +307,7 @@ def _shirt_seams(p: Float64, tube: int) -> Float64:
         return np.minimum(np.abs(length_inside_sleeve(p) - 0.018), _from_armhole(p))
     lines = (
         np.abs(depth_below_collar(p) - 0.016),
-        np.abs(p[:, 1] - HEM - 0.020),
+        np.abs(height_above_shirt_hem(p) - 0.020),
         _from_armhole(p),
     )
     return np.min(lines, axis=0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from build import Build
 
 from fba.arrays import Float64
 
@@ -40,7 +41,8 @@ class Looks:
     brow_height: of the brows, relative to the first figure's. beard: how far its shade
     shows, 0..1. lines: depth of the lines of an old skin, 0..1.
     gloss: of the skin, relative to the first figure's. girth, muscles: of the arms, likewise.
-    iris: inner and outer colour. shirt, trousers, shoes: factors of the first figure's colours.
+    iris: inner and outer colour. shirt, trousers, shoes: factors of the first figure's colours. build: of the
+    body, where it differs.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Looks:
     shirt: Colour = (1.0, 1.0, 1.0)
     trousers: Colour = (1.0, 1.0, 1.0)
     shoes: Colour = (1.0, 1.0, 1.0)
+    build: Build | None = None
 
 
 ALEX = Looks(
@@ -88,9 +91,19 @@ RUTH = Looks(
     skin=(128, 86, 66), blush=(132, 76, 62), socket=(94, 60, 48), neck=(120, 80, 61),
     waterline=(150, 98, 86), caruncle=(186, 118, 108), lip=(132, 78, 69), lip_line=(84, 45, 40),
     freckle=(92, 58, 42), scalp=(84, 66, 58), brow=(66, 56, 52), brow_height=0.72, lines=1.0, gloss=0.75,
-    girth=0.86, muscles=0.25,
+    girth=0.86, muscles=0.50,
     iris=((0.080, 0.040, 0.018), (0.038, 0.021, 0.012)),
     shirt=(3.0, 0.62, 0.45), trousers=(1.1, 0.75, 0.60), shoes=(0.8, 0.55, 0.45),
+    build=Build(
+        trunk=(
+            (0.45, 0.000, 0.000, 0.000), (0.68, 0.008, 0.003, 0.006), (0.82, 0.016, 0.004, 0.018),
+            (0.92, 0.015, 0.010, 0.018), (1.02, -0.004, 0.010, 0.000), (1.10, -0.023, 0.002, -0.008),
+            (1.18, -0.024, -0.002, -0.012), (1.30, -0.024, -0.002, -0.016), (1.42, -0.024, 0.000, -0.012),
+            (1.50, 0.000, 0.000, 0.000),
+        ),
+        bust=0.041, bust_at=(0.068, 1.235), bust_size=(0.086, 0.088, 0.062),
+        shoulders=0.023, slope=0.010, shorter=0.020, arms=0.955, carried=(2.5, 5.0),
+    ),
 )  # fmt: skip
 """A woman of about sixty-five with brown skin and grey curls."""
 FIGURES = (ALEX, RUTH)

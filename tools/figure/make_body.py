@@ -20,6 +20,7 @@ import rig
 import shoes
 from cutting import Cloth
 from person import Person
+from scipy.spatial import cKDTree
 from sculpt import ORIGIN
 
 import figure
@@ -40,8 +41,10 @@ DARKEST = 0.55
 """Brightness of a colour where no light of the sky falls."""
 NAIL = (0.52, 0.60)
 """Share of a finger's last bone from its joint, and of a normal outwards, from which a nail is."""
-NAIL_COLOUR = (1.16, 1.12, 1.14, 2.0)
+NAIL_COLOUR = (1.24, 1.26, 1.30, 2.2)
 """Factors of the complexion and of its gloss on nails."""
+BETWEEN = np.array([0.50, 0.62, 0.64])
+"""Share of light missing on the sides of fingers that face each other."""
 UNDER = 0.02
 """Skin stays this far (m) under the edges of clothes."""
 TUCKED = 0.014
@@ -130,7 +133,28 @@ def _flush_factors(piece: Piece, bones: rig.Rig) -> Float64:
     for joints, strength, reach in ((tips, 0.9, 0.014), (bends, 0.9, 0.012)):
         away = np.linalg.norm(piece.vertices[:, None] - middles[joints], axis=2).min(axis=1)
         share = np.maximum(share, strength * np.exp(-((away / reach) ** 2)))
-    return 1 - share[:, None] * (0.03, 0.20, 0.22)
+    return (1 - share[:, None] * (0.05, 0.28, 0.30)) * _between_fingers(piece, bones)
+
+
+def _between_fingers(piece: Piece, bones: rig.Rig) -> Float64:
+    """Return (V, 3) factors: fingers are darker where they face their neighbours."""
+    factor = np.ones((len(piece.vertices), 3))
+    for side in "lr":
+        chains = [[bones.names.index(f"{side}_{finger}{n}") for n in (1, 2, 3)] for finger in FINGERS]
+        for number, chain in enumerate(chains):
+            own = np.flatnonzero(piece.weights[:, chain].sum(axis=1) > 0.5)
+            for beside in chains[max(number - 1, 0) : number] + chains[number + 1 : number + 2]:
+                line = np.concatenate([bones.bind[beside, :3, 3], bones.bind[beside[-1:], :3, 3]])
+                line[3] += line[2] - line[1]  # towards the fingertip
+                points = np.concatenate(
+                    [line[k] + np.linspace(0, 1, 8)[:, None] * (line[k + 1] - line[k]) for k in range(3)]
+                )
+                away, row = cKDTree(points).query(piece.vertices[own])
+                towards = (points[row] - piece.vertices[own]) / away[:, None]
+                facing = smoothstep(((piece.normals[own] * towards).sum(axis=1) - 0.15) / 0.75)
+                near = smoothstep((0.030 - away) / 0.012)
+                factor[own] *= 1 - (facing * near)[:, None] * BETWEEN
+    return factor
 
 
 def _paint_nails(piece: Piece, bones: rig.Rig) -> None:

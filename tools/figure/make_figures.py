@@ -19,7 +19,7 @@ from sculpt import ORIGIN
 
 import figure
 from fba.arrays import Float32, Float64, Int32
-from fba.body import BodyModel
+from fba.body import BodyModel, Skeleton
 from fba.face import Deformer, FaceModel
 from fba.face.calibration import reshape as carry
 from fba.face.checks._fap_checks import TURNING
@@ -44,6 +44,7 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
     assert eye.colours is not None
     offset = ORIGIN + np.array([0.0, figure.EYE_LEVEL, 0.0])
     moved = reshape(looks, slim_arms(looks, body) - offset) + offset
+    moved, bind = in_build(looks, body, moved)
     tints = {"shirt": looks.shirt, "trousers": looks.trousers, "shoes": looks.shoes}
     tints["skin"] = tints["neck"] = linear(looks.neck) / linear(ALEX.neck)
     tints["hair"] = np.mean([linear(c) for c in looks.hair.colours], axis=0) / np.mean(
@@ -61,8 +62,37 @@ def make_figure(looks: Looks) -> dict[str, np.ndarray]:
         "picture": np.frombuffer(skin.material.texture, np.uint8),
         "body": np.array(shape_key(body.parts)),
         "body_moves": steps(moved - body.vertices),
+        "body_bind": bind.astype(np.float32),
+        "body_centres": hanging(body.skeleton, bind).astype(np.float32),
         "body_tints": np.array([tints[part.name] for part in body.parts], np.float32),
     }
+
+
+def in_build(looks: Looks, body: BodyModel, moved: Float64) -> tuple[Float64, Float64]:
+    """Return vertices (V, 3) and bind matrices (J, 4, 4) of the body in the build of a figure.
+
+    moved: the vertices in the first figure's build.
+    """
+    bind = body.bind.copy()
+    if looks.build is None:
+        return moved, bind
+    arms = [body.skeleton.number(f"{side}_shoulder") for side in "lr"]
+    share = carried_share(body, arms[0]) + carried_share(body, arms[1])
+    of_arm = np.isin(np.arange(len(bind)), [n for arm in arms for n in body.skeleton.descendants(arm)])
+    joints = bind[:, :3, 3].copy()
+    bind[:, :3, 3] = looks.build.move(joints, of_arm.astype(np.float64), joints[arms])
+    looks.build.turn_arms(bind, body.skeleton)
+    return looks.build.move(moved, share, joints[arms]), bind
+
+
+def hanging(skeleton: Skeleton, bind: Float64) -> Float64:
+    """Return (J, 3), where joints with bind matrices (J, 4, 4) are in the default posture."""
+    centres = bind[:, :3, 3].copy()
+    for number, above in enumerate(skeleton.parents):
+        if above >= 0:
+            gap = bind[number, :3, 3] - bind[above, :3, 3]
+            centres[number] = centres[above] + bind[above, :3, :3].T @ gap
+    return centres
 
 
 def slim_arms(looks: Looks, body: BodyModel) -> Float64:

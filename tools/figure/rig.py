@@ -46,7 +46,7 @@ STRAIGHT = (0.13, 0.80)
 """Heights between which the outline of a leg is evened out, metres."""
 EVEN, ROUND = 0.13, 0.16
 """Metres along the leg over which it is, and the length as which a radian around it counts."""
-KNUCKLE = (0.010, 0.008, 0.0028)
+KNUCKLE = (0.010, 0.008, 0.0042)
 """Metres of a knuckle off the joint, to its edge, and by which it stands out."""
 
 

@@ -104,13 +104,16 @@ class Arms:
 
     up, forward: degrees of the shoulder girdle. twist: degrees of the upper arm, which turns
     the elbow outward.
-    wrist: degrees. curl: degrees of each finger joint.
+    wrist: degrees. trail: degrees by which the hand trails behind the arm as it swings. pronation: degrees by
+    which the palm faces backwards. curl: degrees of each finger joint.
     """
 
     up: float
     forward: float
     twist: float
     wrist: float
+    trail: float
+    pronation: float
     curl: float
 
 

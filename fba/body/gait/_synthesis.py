@@ -33,6 +33,8 @@ _MORE_CURL = {"index": 0.85, "middle": 0.95, "ring": 1.1, "pinky": 1.2}
 """Factors of the curl of each finger: a hand at rest closes towards the little finger."""
 _JOINT_CURL = {1: 0.75, 2: 1.4, 3: 0.85}
 """Factors of the curl of the joints along a finger: the middle one bends most."""
+_SPREAD = {"index": -4.0, "middle": -1.0, "ring": 2.0, "pinky": 5.0}
+"""Degrees by which fingers at rest are apart."""
 _GIRDLE = 0.7
 """Turn of the shoulder girdles relative to that of the chest, which they continue."""
 _LATE = 0.02
@@ -204,6 +206,9 @@ def write_posture(writer: Writer, skeleton: Skeleton, plan: Plan, phase: Float64
         if girdle in skeleton:
             writer.turn(girdle, 2, sign * np.radians(arms.up) * constant)
             writer.turn(girdle, 1, _GIRDLE * turn - sign * np.radians(arms.forward) * constant)
+        for finger, degrees in _SPREAD.items():
+            if (joint := f"{letter}_{finger}1") in skeleton:
+                writer.turn(joint, 0, np.radians(degrees) * constant)
         curl = np.radians(arms.curl) * constant
         for number in (1, 2, 3):
             for finger in FINGERS:
@@ -249,3 +254,10 @@ def swing_arms(writer: Writer, plan: Plan, phase: Float64) -> None:
         writer.turn(f"{letter}_elbow", 0, -periodic_curve(KNOTS, bend, arm_phase, plan.interpolation))
         wrist = -side.sign * np.radians(character.arms.wrist)
         writer.turn(f"{letter}_wrist", 2, np.full(phase.shape, wrist))
+        # the hand trails behind the arm, which is fastest halfway
+        trail = np.radians(character.arms.trail) * np.clip(plan.stride_ratio, 0.0, 1.4)
+        writer.turn(
+            f"{letter}_wrist", 0, trail * cosine_wave(KNOTS, arm_phase - 0.25 - _LATE, plan.interpolation)
+        )
+        inwards = -side.sign * np.radians(character.arms.pronation)
+        writer.turn(f"{letter}_elbow", 1, np.full(phase.shape, inwards))
