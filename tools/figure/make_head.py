@@ -197,7 +197,7 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     y, z = surface.vertices[:, 1], surface.vertices[:, 2]
     oily = 1 - smoothstep(np.abs(surface.vertices[:, 0]) / 0.03)
     oily = oily * smoothstep((z + 0.01) / 0.02) * smoothstep((y + 0.05) / 0.03)
-    gloss = 0.32 + 0.14 * oily + 0.13 * lips + 0.05 * wet - 0.15 * wet * (marks.lip > 0) + 0.2 * lids
+    gloss = 0.32 + 0.14 * oily + 0.08 * lips + 0.05 * wet - 0.15 * wet * (marks.lip > 0) + 0.2 * lids
     gloss -= 0.2 * smoothstep((np.abs(surface.vertices[:, 0]) - 0.066) / 0.006) * (z < -0.06)  # ears
     colours[:, 3] = gloss * (1 - cropped)  # 0: light does not scatter in hair
     # What only an open mouth shows of the lips is redder than what the sky lights.
@@ -206,13 +206,13 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     inside = near & (ring < 0)
     # The throat is darker than the cheeks.
     cheek = smoothstep((np.abs(surface.vertices[:, 0]) - 0.012) / 0.018)
-    depth = smoothstep((0.012 - z) / 0.060) * (1 - 0.5 * cheek)
+    depth = smoothstep((-0.008 - z) / 0.050) * (1 - 0.75 * cheek)
     depth = np.maximum(depth, 0.15 * smoothstep((-ring - 0.5) / 3.5)) * inside
-    colours[:, :3] *= 1 - depth[:, None] * (0.62, 0.74, 0.74)
+    colours[:, :3] *= 1 - depth[:, None] * (0.58, 0.68, 0.68)
     colours[:, 3] *= np.where(
         near, 0.1 + 0.9 * smoothstep(ring / sculpt.CONTACT_RING), 1.0
     )  # no sky in there
-    colours[:, :3] *= _nostrils(surface)[:, None]
+    colours[:, :3] *= np.where(inside, 1.0, _nostrils(surface))[:, None]
     return colours
 
 

@@ -21,28 +21,32 @@ UNDER_LIP = (0.28, 0.32, 0.34)
 """Shares by which a crown is darker at its neck than at its edge."""
 UNEVEN = 0.05
 """Share by which teeth are darker or brighter than each other."""
-GUM = np.array([0.60, 0.225, 0.20])
+GUM = np.array([0.60, 0.20, 0.165])
 TONGUE = np.array([0.58, 0.155, 0.135])
+WET = np.array([0.85, 0.42, 0.38])
+"""Where a tongue mirrors the light of the opening."""
 TONGUE_UNDER = np.array([0.46, 0.120, 0.110])
 HALF_WIDTH, DEPTH = 0.0285, 0.0420
 """Half axes of the outer edge of the upper arch of teeth, half an oval, metres."""
 UPPER_POWER, LOWER_POWER = 2.55, 2.1
 """How square the arches are, 2 for an ellipse: teeth lie close behind the lips up to their corners."""
-LOWER_INSET = 0.0004
+LOWER_INSET = 0.0008
 """Metres by which the lower arch is smaller: the incisors' edges touch."""
-SINKING = np.array([0.0, 0.1, 0.8, 2.0, 3.6, 5.4, 7.4]) / 1000
+SINKING = np.array([0.0, 0.1, 0.5, 1.3, 2.4, 3.8, 5.4]) / 1000
 """Metres by which the edge of each lower tooth is deeper than that of the first: the lip hides them."""
 SUNK_GUM = 0.4
 """Share of that by which their gum is deeper: so low a crown is short, too."""
 RISING = np.array([0.0, 0.55, 0.1, 0.5, 0.9, 1.3, 1.8]) / 1000
 """Metres by which the edge of each upper tooth is higher than that of the first: a line that bends as the
 lower lip does, with lateral incisors above it."""
-CORNERS = (0.45, 1.0)
+CORNERS = (0.5, 0.9)
 """Millimetres by which an edge is rounded off at its corners, towards the midline and away from it."""
+CONVEX = 0.09
+"""By how much of its width the outer face of a crown recedes towards its sides."""
 TURNS = np.radians([0, 30, 60, 90, 120, 150, 180, 225, 270, 315])
 """Places of the vertices around a crown, denser in front: behind, hardly anything is seen."""
 AROUND = len(TURNS)
-WALLED, ABOVE_EDGE = 5, 0.0013
+WALLED, ABOVE_EDGE = 5, 0.0006
 """How many crowns of each side have a wall within, and how far that is from their edges, metres."""
 WALL_COLOUR = np.array([0.56, 0.47, 0.36])
 
@@ -102,7 +106,7 @@ def _arch(length: float, sign: float) -> tuple[Float64, float]:
 def _tooth(width: float, height: float, thick: float, flat: float, place: int, sign: float) -> Mesh:
     """Return the mesh of a crown: outer face at z = 0, edge at y = 0, gum towards sign x y."""
     cx, cz = _rounded_square(TURNS, 2.8)
-    rows = np.array([0.0, 0.06, 0.32, 0.75, 1.12])  # edge to below the gum
+    rows = np.array([0.0, 0.09, 0.34, 0.75, 1.12])  # edge to below the gum
     # Narrow at the neck, widest near the edge; the edge of a front tooth is thin. Neighbours meet within each
     # other, so that however few triangles are left, there is no gap.
     wide = np.interp(rows, [0, 0.05, 0.25, 0.7, 1.12], [0.95, 1.01, 1.03, 1.00, 0.88])
@@ -112,10 +116,12 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     vertices[..., 0] = cx * width / 2 * wide[:, None]
     vertices[..., 1] = rows[:, None] * height * sign
     vertices[..., 2] = (cz - 1) * thick / 2 * deep[:, None] + bulge[:, None]
+    vertices[..., 2] -= CONVEX * width * cx**2 * (cz > -0.1)
     if place == 3:  # a canine has a point
-        vertices[0, :, 1] += sign * 0.0008 * np.abs(cx)
-        vertices[1, :, 1] += sign * 0.0005 * np.abs(cx)
-    corner = np.where(cx > 0, CORNERS[1], CORNERS[0]) / 1000 * np.abs(cx) ** 12 * min(width / 0.0085, 1.0)
+        vertices[0, :, 1] += sign * 0.0011 * np.abs(cx)
+        vertices[1, :, 1] += sign * 0.0007 * np.abs(cx)
+    corner = np.where(cx > 0, CORNERS[1], CORNERS[0]) / 1000 * np.abs(cx) ** 5
+    corner *= (min(width / 0.0085, 1.0) if place < 3 else 0.5) * (1.0 if sign > 0 else 0.4)
     vertices[:2, :, 1] += corner * sign * np.array([[1.0], [0.75]])
     cap = vertices[0].mean(axis=0) * np.array([1, 0, 1]) + np.array(
         [0, sign * (0.0 if flat < 0.5 else 0.0006), 0]
@@ -143,7 +149,7 @@ def _tooth(width: float, height: float, thick: float, flat: float, place: int, s
     colours = np.concatenate([np.repeat(colour, AROUND, axis=0), colour[:1] * fissure])
     # Between the teeth it is darker: a thin line.
     side = np.concatenate([np.tile(np.abs(cx) ** 10, len(rows)), [0.0]])
-    colours = colours * (1 - side[:, None] * (0.34, 0.42, 0.46))
+    colours = colours * (1 - side[:, None] * (0.24, 0.31, 0.35))
     return flat_vertices, np.concatenate([triangles, lid]), np.c_[colours, np.full(len(colours), 0.75)]
 
 
@@ -170,7 +176,7 @@ def _gum(front: Float64, sign: float, rows: list[dict[str, str]]) -> Mesh:
     for k, length in enumerate(half):
         tooth = min(int(np.searchsorted(ends, length, side="right")) - 1, len(widths) - 1)
         across = (length - ends[tooth]) / widths[tooth] * 2 - 1
-        low[k] = heights[tooth] * (0.97 - 0.22 * np.abs(across) ** 2.5)
+        low[k] = heights[tooth] * (0.97 - (0.22 if tooth < 3 else 0.08) * np.abs(across) ** 2.5)
     middles = (ends[:-1] + ends[1:]) / 2
     sunk = np.interp(half, middles, SINKING * SUNK_GUM) if sign < 0 else np.zeros(len(half))
     positions = [_arch(length, sign) for length in half]
@@ -228,8 +234,8 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     """Return the mesh of a tongue lying flat, and vertices of its feature points. tip: (3,), at the teeth."""
     # Down the tongue from its root to its tip, mm: z, top, half width, height.
     spine = np.array([
-        (-65, -34, 15, 24), (-61.5, -16, 16, 24), (-56, -7.4, 17, 20), (-48, -3.1, 17.3, 17.5),
-        (-38, -1.4, 17.2, 15.5), (-28, -0.7, 16.8, 13), (-19, -0.1, 15.3, 10.2), (-10.5, 0.4, 12.6, 7.4),
+        (-65, -34, 15, 24), (-61.5, -14, 16, 25), (-56, -3.4, 16.5, 24), (-48, 2.2, 16.8, 22.5),
+        (-38, 3.6, 16.8, 20.3), (-28, 3.0, 16.4, 16.7), (-19, 1.7, 15.2, 12.0), (-10.5, 0.9, 12.6, 7.9),
         (-4.4, 0.6, 9.3, 5.0), (-1.6, 0.45, 6.6, 3.6), (-0.4, 0.25, 4.0, 2.2),
     ])  # fmt: skip
     from scipy.interpolate import PchipInterpolator
@@ -238,13 +244,13 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     t = np.linspace(0, 1, rings)
     knots = np.linspace(0, 1, len(spine))
     z, top, half, tall = PchipInterpolator(knots, spine / 1000)(t).T
-    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    turn = np.r_[np.linspace(0, np.pi, 16, endpoint=False), np.linspace(np.pi, 2 * np.pi, 8, endpoint=False)]
     cx, cy = _rounded_square(turn, 2.2)
     vertices = np.zeros((rings, around, 3))
     vertices[..., 0] = half[:, None] * cx
     vertices[..., 1] = top[:, None] + tall[:, None] * (cy - 1) / 2
     groove = (
-        0.0011 * np.exp(-((vertices[..., 0] / 0.0022) ** 2)) * (cy > 0.3) * np.clip((t[:, None]) * 3, 0, 1)
+        0.0009 * np.exp(-((vertices[..., 0] / 0.0028) ** 2)) * (cy > 0.3) * np.clip((t[:, None]) * 3, 0, 1)
     )
     vertices[..., 1] -= groove * np.clip((1 - t[:, None]) * 6, 0, 1)
     vertices[..., 2] = z[:, None]
@@ -261,15 +267,18 @@ def tongue(tip: Float64) -> tuple[Mesh, dict[str, int]]:
     under = np.clip(0.5 - cy, 0, 1)[None, :, None]
     colours = TONGUE * (1 - under) + TONGUE_UNDER * under
     # Darker, and redder, towards the throat; pale papillae on its back, and a dark groove along its middle.
-    colours = colours * (0.30 + 0.70 * t[:, None, None] ** (1.1, 1.6, 1.7))
+    colours = colours * (0.36 + 0.64 * t[:, None, None] ** (1.0, 1.3, 1.4))
     middle = np.exp(-((cx / 0.16) ** 2)) * (cy > 0.3)
     colours = colours * (1 - 0.30 * (middle * np.clip((1 - t[:, None]) * 8, 0, 1)))[..., None]
+    # Beside the groove it is round, and wet.
+    wet = np.exp(-(((np.abs(cx) - 0.45) / 0.22) ** 2)) * (cy > 0.3) * 0.3 * np.sin(np.pi * t[:, None]) ** 2
+    colours = colours + wet[..., None] * (WET - colours)
     random = np.random.default_rng(5)
     colours = colours * (1 + 0.22 * (random.random((rings, around, 1)) - 0.5))
     flat_colours = np.concatenate([colours.reshape(-1, 3), [TONGUE * 0.2], [TONGUE]])
     body = int(np.abs(t - 0.568).argmin())
-    upward = around // 4
+    upward, opposite = 8, 16
     side = int(np.abs(t - 0.64).argmin()) * around
-    points = {"6.1": point, "6.2": body * around + upward, "6.3": side, "6.4": side + around // 2}
-    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.12)])
+    points = {"6.1": point, "6.2": body * around + upward, "6.3": side, "6.4": side + opposite}
+    mesh = (flat + tip, np.concatenate([triangles, *caps]), np.c_[flat_colours, np.full(len(flat), 0.45)])
     return mesh, points

@@ -17,7 +17,7 @@ from fba.sampling import smoothstep
 
 SIZE = 2048
 
-MOUTH, BEARD = np.array([158, 76, 72.0]), np.array([146, 120, 118.0])
+MOUTH, BEARD = np.array([186, 94, 88.0]), np.array([146, 120, 118.0])
 """sRGB, 0..255."""
 MAX_STEP = 0.003
 """Metres: farther apart than this, texels are on both sides of a seam."""
@@ -303,21 +303,22 @@ def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Loo
     soft = np.where(lower, 2.6, 1.8)
     red = np.where(near, smoothstep((border + 0.45 * soft - ring) / soft), 0.0)
     lines = noise(p * (1.0, 0.12, 0.12), 0.00065, 11) * 0.6 + noise(p * (1.0, 0.25, 0.25), 0.0016, 12) * 0.4
-    lines = np.where(lines < 0, 2.2 * lines, lines)  # creases
+    lines = np.where(lines < 0, 1.6 * lines, lines)  # creases
     lip = (
-        np.array(looks.lip)
-        + lines[:, None] * np.where(lower[:, None], [13, 12, 11.0], [10, 10, 9.0])
-        + np.where(lower[:, None], [-20, -23, -19.0], [-8, -7, -6.0])
+        np.array(looks.lip) + 6.0 * lines[:, None] + np.where(lower[:, None], [-20, -23, -19.0], [8, 0, 0.0])
     )
     # Below it is a shade, and its inner half is darker: flesh that bends in.
     below = np.where(near & lower, np.exp(-(((ring - border - 2.4) / 1.5) ** 2)), 0.0) * (1 - corner)
     colour = _blend(colour, np.array(looks.blush) * 0.86, below * 0.34)
     lip = _blend(lip, np.array(looks.lip_line), np.where(lower, 0.38 * smoothstep((3.6 - ring) / 2.8), 0.0))
     colour = _blend(colour, lip, red * 0.88)
-    seam = np.where(near, smoothstep((2.1 - ring) / 1.2), 0.0) * (1 - 0.6 * corner)
+    # The lower side of the upper lip is redder: it mirrors the lower one, not the grey studio.
+    glow = np.where(lower, 0.0, 1 - smoothstep((ring - 1.6) / 1.8)) * red
+    colour += glow[:, None] * (12.0, -6.0, -4.0)
+    seam = np.where(near & lower, smoothstep((2.1 - ring) / 1.2), 0.0) * (1 - 0.6 * corner)
     colour = _blend(colour, np.array(looks.lip_line), seam * 0.45)
     # The corners lie in the shade of the cheeks.
-    colour = _blend(colour, np.array(looks.lip_line), 0.42 * _spot(p, (26.2, -69.6, 4.6), 4.6) ** 1.5)
+    colour = _blend(colour, np.array(looks.lip), 0.30 * _spot(p, (26.2, -69.6, 4.6), 4.6) ** 1.5)
     inside = np.where(near, smoothstep((0.6 - ring) / 1.2), 0.0)
     colour = _blend(colour, MOUTH, inside)
     # A light edge above the upper lip.

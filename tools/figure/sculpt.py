@@ -34,6 +34,9 @@ CONTACT_RING = 1
 
 CREASE_ROUNDS = 14
 """Rounds of averaging with neighbours that soften the crease of the upper lids."""
+UPPER_LIP = np.array([0.0, 0.0, 1.4, 1.4, 0.4, 0.2, 0.0]) / 1000
+"""Metres by which rings of the upper lip, from the border of the inside on, are moved forward: it is round,
+and its upper half faces the light."""
 LIP_OVERLAP = 0.0009
 """Metres by which the upper lip reaches below that ring, behind it."""
 
@@ -273,6 +276,9 @@ def _fuller_lips(vertices: Float64, marks: Marks) -> Float64:
     lift = np.where(marks.lip > 0, 0.0011, -0.0013)
     vertices[:, 1] += np.where(marks.lip != 0, lift, 0.0) * fade * (0.25 + 0.75 * middle)
     vertices[:, 2] += 0.0008 * fade * middle
+    sides = 1 - smoothstep((np.abs(vertices[:, 0]) - 0.008) / 0.014)
+    forward = np.interp(marks.mouth, np.arange(len(UPPER_LIP)), UPPER_LIP)
+    vertices[:, 2] += np.where(marks.lip > 0, forward * sides, 0.0)
     return vertices
 
 

@@ -41,13 +41,16 @@ CLOSING_SKY = 0.45
 """Least share of the sky's light along lips and lids, where they touch."""
 ENCLOSED = 0.04
 """Vertices near the mouth that see less of the sky than this while it is shut may be inside."""
-INSIDE_KEY, INSIDE_SKY, TONGUE_SKY = 0.44, 0.46, 0.08
+INSIDE_KEY, INSIDE_SKY, TONGUE_SKY = 0.55, 0.66, 0.35
 """Shares of key light and sky that reach the inside of an open mouth by reflection; a tongue, lit by red
 walls, mirrors little of the sky."""
-THROAT, DARKEST = 0.9, 0.2
+THROAT, DARKEST = 1.1, 0.35
 """Distance behind the lips, in ES0, at which the least share of that light is left, and that share."""
 CONSTANT_HARMONIC = 0.282095
 """The first spherical harmonic, equal in all directions."""
+FORWARD, FORWARD_HARMONIC = 2, 0.45
+"""Place of the harmonic that is greatest ahead, and its value there, for large lights: into the mouth light
+comes from ahead, none from behind."""
 TURN_DECIMALS = 2
 """Decimals to which the head's rotation is rounded; the light changes invisibly little."""
 PRODUCT = 4096
@@ -295,7 +298,9 @@ def _lit_inside(wide: Visibility, sky: Float64, share: Float64) -> Visibility:
     is at that depth.
     """
     light = wide.light.copy()
-    light[:, 0] += np.where(sky > 0, share * INSIDE_KEY / CONSTANT_HARMONIC, 0.0)
+    key = np.where(sky > 0, share * INSIDE_KEY, 0.0)
+    light[:, 0] += key * 0.55 / CONSTANT_HARMONIC
+    light[:, FORWARD] += key * 0.77 / FORWARD_HARMONIC
     return wide._replace(light=light, open=(wide.open + share * sky * (1 - wide.open)).astype(np.float32))
 
 
