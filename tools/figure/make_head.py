@@ -65,7 +65,8 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
     marks = sculpt.refine_marks(refined, coarse)
     edges = unique_edges(refined.triangles)
     softened = sculpt.soften_crease(refined.vertices, marks, edges)
-    vertices = sculpt.press_lips(sculpt.lay_on_eyeballs(softened, marks.eye), marks) - ORIGIN
+    softened = sculpt.thin_lids(sculpt.lay_on_eyeballs(softened, marks.eye), marks)
+    vertices = sculpt.press_lips(softened, marks) - ORIGIN
     uvs = np.stack([refined.uvs[:, 0], PchipInterpolator(*ROWS)(refined.uvs[:, 1])], axis=1)
     return replace(refined, vertices=symmetrise(vertices), uvs=uvs), marks
 
