@@ -204,6 +204,11 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     # What only an open mouth shows of the lips is redder than what the sky lights.
     inner = np.where(near, 1 - smoothstep((ring - 0.2) / 1.4), 0.0)
     colours[:, :3] *= 1 - inner[:, None] * (0.06, 0.24, 0.24)
+    # Little light falls into the inner corners of the eyes.
+    corner = (1 - smoothstep((eye - 0.6) / 2.0)) * (
+        1 - smoothstep((np.abs(surface.vertices[:, 0]) - 0.021) / 0.003)
+    )
+    colours[:, :3] *= 1 - corner[:, None] * (0.22, 0.36, 0.38)
     inside = near & (ring < 0)
     # The throat is darker than the cheeks.
     cheek = smoothstep((np.abs(surface.vertices[:, 0]) - 0.012) / 0.018)

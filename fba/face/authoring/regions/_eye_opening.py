@@ -173,8 +173,9 @@ def stretch_fold(
     """Return the shifts (K, M, 3) of an upper lid with the skin above its edge stretched as it closes.
 
     Closed, that skin is smooth like a bent plate, without ridges of the fold that it came out of; towards the
-    corners of the eye, where lids run into the skin around, the edge is, too. share: (N,), share of the margin's motion at each vertex of the surface. vertices: (M,), those that move. ways:
-    (K,), 1 where the eye is closed.
+    corners of the eye, where lids run into the skin around, their edges are, too. share: (N,), share of the
+    margin's motion at each vertex of the surface. vertices: (M,), those that move. ways: (K,), 1 where the
+    eye is closed.
     """
     closed = surface.vertices.copy()
     closed[vertices] += shifts[np.abs(ways - 1).argmin()]
@@ -183,14 +184,19 @@ def stretch_fold(
     outer = (np.linalg.norm(arms, axis=1) > OUTER * eye.radius) & (arms[:, 2] > 0)
     along = (closed[:, 0] - opening.x[0]) / (opening.x[-1] - opening.x[0])
     corner = 1 - smoothstep(np.minimum(along, 1 - along) / CORNER)
-    free = outer & (share > STRETCHED[0]) & (share < STRETCHED[1] + corner) & (share != 1.0)  # margins meet
+    # margins, whose share is 1, meet where they are
+    free = outer & (share > STRETCHED[0]) & (share < STRETCHED[1] + corner) & (share != 1.0)
     near = free
     for _ in range(PLATE_RINGS):
         near = near | surface.mask(surface.edges[near[surface.edges].any(axis=1)].ravel())
     fixed = np.flatnonzero(near & ~free)
     smooth = solve_smooth_field(surface, free, fixed, closed[fixed], slack=SLACK)
     raised = ((smooth - closed) * outwards).sum(axis=1)
-    lowest = np.minimum(OUTER * eye.radius - np.linalg.norm(closed - eye.centre, axis=1), 0.0)
+    # between vertices, the skin of a coarse mesh is lower
+    edges = surface.edges[free[surface.edges].any(axis=1)]
+    dips, low = ((closed[edges[:, 0]] - closed[edges[:, 1]]) ** 2).sum(axis=1), np.zeros(len(surface))
+    np.maximum.at(low, edges, dips[:, None] / (4 * eye.radius))
+    lowest = np.minimum(OUTER * eye.radius + low - np.linalg.norm(closed - eye.centre, axis=1), 0.0)
     most = (MOST_RAISED + (MOST_IN_CORNER - MOST_RAISED) * corner) * eye.radius
     raised = np.clip(raised, np.maximum(lowest, -most), most)
     raised[~free] = 0.0
