@@ -24,7 +24,7 @@ MIDDLE = np.array([0.0, 0.012, -0.085])
 """Point of the skull from which hair stands away."""
 TOP = (0.0, 0.95)
 """Slopes of the head, as the sine of the angle, between which the hair reaches the thickness of the top."""
-CALM, CALMED = (0.080, 0.098), 0.65
+CALM, CALMED = (0.080, 0.098), 0.8
 """Heights of the skin, metres, over which locks come to stand out less, and by what share."""
 PARTING = np.array([[0.040, 0.045, 0.008], [0.012, 0.106, -0.135]])
 """Ends of the parting, on the subject's left, from the forehead to the crown; all strands lead away from it,
