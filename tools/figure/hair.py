@@ -24,8 +24,8 @@ MIDDLE = np.array([0.0, 0.012, -0.085])
 """Point of the skull from which hair stands away."""
 TOP = (0.0, 0.95)
 """Slopes of the head, as the sine of the angle, between which the hair reaches the thickness of the top."""
-CALM, CALMED = (0.080, 0.098), 0.8
-"""Heights of the skin, metres, over which locks come to stand out less, and by what share."""
+CALM = (0.080, 0.098)
+"""Heights of the skin between which locks cease to stand out, metres."""
 PARTING = np.array([[0.040, 0.045, 0.008], [0.012, 0.106, -0.135]])
 """Ends of the parting, on the subject's left, from the forehead to the crown; all strands lead away from it,
 metres. Before the hairline it is not seen, but strands at the hairline lead across, not all ways."""
@@ -109,8 +109,8 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
     full = full + _roundness(folded, above > 0)
     for (place, reach), more in zip(VOLUMES, hair.volumes, strict=True):
         full = full + more * np.exp(-(((folded - place) / reach) ** 2).sum(axis=1))
-    # Little on the crown, whose highest point is a feature point.
-    lumps = hair.lumps * (1 - CALMED * smoothstep((folded[:, 1] - CALM[0]) / (CALM[1] - CALM[0])))
+    # Not on the crown, whose highest point is a feature point.
+    lumps = hair.lumps * (1 - smoothstep((folded[:, 1] - CALM[0]) / (CALM[1] - CALM[0])))
     grains = folded if hair.curly else folded * (0.7, 0.35, 0.7)  # straight hair hangs in locks
     lumps = lumps * (noise(grains, 0.013, 41) + 0.6 * noise(grains, 0.006, 42))
     # Before the ears hair lies close to the head.
