@@ -61,13 +61,14 @@ CROPPED = (
     # a place on the left, how far around it, metres; how much
     ((0.0, -0.050, -0.185), (0.085, 0.042, 0.075), 2.8),
     ((0.076, -0.020, -0.066), (0.020, 0.028, 0.018), 2.6),
+    ((0.062, 0.036, -0.022), (0.018, 0.034, 0.022), 1.4),
 )
-"""Where hair is cropped ever shorter towards its edge: the nape and the sideburn."""
+"""Where hair is cropped ever shorter towards its edge: the nape, the sideburn, the temple."""
 STRANDS, SEGMENTS = 16, 6
 """Of each lock, and straight pieces of each strand."""
 WIDTH = 0.0004
 """Of a strand, metres."""
-PROFILES = np.array([[-0.14, -0.04, 0.03, 0.06, 0.04, -0.02], [-0.42, 0.0, 0.25, 0.25, 0.0, -0.42]])
+PROFILES = np.array([[-0.24, -0.08, 0.03, 0.08, 0.05, -0.02], [-0.42, 0.0, 0.25, 0.25, 0.0, -0.42]])
 """How much brighter a strand is from its root to its tip: of straight and of curly hair."""
 DARKEST, BRIGHTEST = -1.4, 1.4
 """Tones at the ends of what a picture holds."""
@@ -110,7 +111,8 @@ def grow(vertices: Float64, hair: Hair) -> Float64:
         full = full + more * np.exp(-(((folded - place) / reach) ** 2).sum(axis=1))
     # Not on the crown, whose highest point is a feature point.
     lumps = hair.lumps * (1 - smoothstep((folded[:, 1] - CALM[0]) / (CALM[1] - CALM[0])))
-    lumps = lumps * (noise(folded, 0.013, 41) + 0.6 * noise(folded, 0.006, 42))
+    grains = folded if hair.curly else folded * (0.7, 0.35, 0.7)  # straight hair hangs in locks
+    lumps = lumps * (noise(grains, 0.013, 41) + 0.6 * noise(grains, 0.006, 42))
     # Before the ears hair lies close to the head.
     ahead = smoothstep((folded[:, 2] + 0.135) / 0.05) * (1 - smoothstep((folded[:, 1] + 0.015) / 0.085))
     full = np.maximum(full * (1 - 0.8 * ahead), DEEPEST)
@@ -232,8 +234,10 @@ def paint_locks(p: Float64, step: Float64, above: Float64, hair: Hair) -> tuple[
     if not hair.curly:
         parted, beside = _parting(p, above)
         cover = cover * (1 - parted)
-        bright = shine(unit(p - MIDDLE)[:, 1] + 0.05 * tone + 0.03 * noise(p, 0.012, 69))
-        tone = tone * (1 + 0.5 * bright) + 0.36 * bright + beside
+        clump = _clumps(p)
+        bright = shine(unit(p - MIDDLE)[:, 1] + 0.07 * tone + 0.07 * clump)
+        tone = tone * (1 + 0.3 * bright) + 0.16 * clump + 0.30 * bright + beside
+        tone = tone - 0.40 * smoothstep((-0.25 - clump) / 0.4)  # between clumps one sees into the shade
     return tone, np.where(above < -0.5, 0.0, cover * thin)
 
 
@@ -244,17 +248,27 @@ def _parting(p: Float64, above: Float64) -> tuple[Float64, Float64]:
     """
     places = strand_places(p)
     away = places.real * _metres(places)
-    line = np.maximum(away + 0.0004 * noise(p, 0.003, 67), 0.0)
-    crossed = 0.48 - 0.30 * noise(p, 0.006, 68)  # by strands of the other side
+    line = np.maximum(away + 0.0007 * noise(p, 0.004, 67), 0.0)
+    crossed = 0.36 - 0.36 * noise(p, 0.006, 68)  # by strands of the other side
     ends = smoothstep((np.cos(places.imag) + 0.75) / 0.7) * smoothstep((above - 0.004) / 0.022)
     # Beside it hair rises out of the shade.
-    risen = 0.16 * np.exp(-(((away - 0.015) / 0.009) ** 2)) - 0.25 * np.exp(-((away / 0.003) ** 2))
+    risen = 0.10 * np.exp(-(((away - 0.015) / 0.009) ** 2)) - 0.12 * np.exp(-((away / 0.004) ** 2))
     return crossed * ends * np.exp(-((line / PARTED) ** 2)), ends * risen
 
 
+def _clumps(p: Float64) -> Float64:
+    """Return (N,), about -1..1, on which of the clumps that straight hair lies in points (N, 3) are."""
+    places = strand_places(p)
+    around = np.stack([np.cos(places.imag), np.sin(places.imag), 0.22 * places.real], axis=1)
+    return 0.6 * noise(around, 0.085, 73) + 0.5 * noise(around, 0.036, 74)
+
+
 def shine(rise: Float64) -> Float64:
-    """Return (N,), 0..1, how far light from above glances off hair that lies `rise` up the head, -1..1."""
-    return np.exp(-(((rise - 0.74) / 0.14) ** 2))
+    """Return (N,), 0..1, how far light from above glances off hair that lies `rise` up the head, -1..1.
+
+    It does so from the outside of hairs, and, fainter and lower, from their far sides.
+    """
+    return np.exp(-(((rise - 0.80) / 0.075) ** 2)) + 0.5 * np.exp(-(((rise - 0.58) / 0.10) ** 2))
 
 
 def _look_up(picture: tuple[Float64, Float64], p: Float64) -> tuple[Float64, Float64]:

@@ -11,7 +11,6 @@ from fba.arrays import Float64
 
 COLOUR = np.array([0.030, 0.020, 0.014])
 """Linear light."""
-SEGMENTS = 3
 MIDDLE_FAN = 0.42
 """Share of the margin at which lashes lean neither to the nose nor to the temple."""
 
@@ -22,7 +21,7 @@ class Row:
 
     count. first, last: shares of the margin from its inner corner between which they stand. length, width:
     of the longest, metres. sizes: shares of that length at the four places of `PLACES`. start, end: which way
-    they point at root and tip: outwards from the eye, upwards, forwards.
+    they point at root and tip: outwards from the eye, upwards, forwards. segments: straight pieces of a lash.
     """
 
     count: int
@@ -33,12 +32,15 @@ class Row:
     sizes: tuple[float, float, float, float]
     start: tuple[float, float, float]
     end: tuple[float, float, float]
+    segments: int
 
 
 PLACES = (0.15, 0.5, 0.75, 0.96)
-UPPER = Row(70, 0.24, 0.94, 0.0055, 0.00022, (0.20, 0.85, 1.0, 0.66), (0.92, -0.40, 0.42), (0.20, 1.05, 0.40))
+UPPER = Row(
+    68, 0.22, 0.95, 0.0062, 0.00017, (0.30, 0.78, 1.0, 0.72), (0.92, -0.40, 0.42), (0.20, 1.05, 0.40), 2
+)
 LOWER = Row(
-    28, 0.34, 0.93, 0.0028, 0.00014, (0.40, 0.75, 1.0, 0.70), (0.95, -0.25, 0.30), (0.55, -0.80, 0.15)
+    23, 0.34, 0.93, 0.0028, 0.00012, (0.40, 0.75, 1.0, 0.70), (0.95, -0.25, 0.30), (0.55, -0.80, 0.15), 2
 )
 
 
@@ -51,14 +53,14 @@ def lashes(margin: Float64, centre: Float64, row: Row) -> Mesh:
     blades = []
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(margin, axis=0), axis=1))])
     along = row.first + (row.last - row.first) * np.linspace(0, 1, row.count) ** 0.92
-    # Neighbours lean towards each other at their tips, as wet hair does.
-    lean = np.repeat(random.normal(0, 0.10, row.count), random.integers(2, 5, row.count))[: row.count]
-    for share, by in zip(np.clip(along + random.normal(0, 0.004, row.count), 0.02, 0.99), lean, strict=True):
+    # A few neighbours lean towards each other at their tips.
+    lean = np.repeat(random.normal(0, 0.05, row.count), random.integers(1, 4, row.count))[: row.count]
+    for share, by in zip(np.clip(along + random.normal(0, 0.002, row.count), 0.02, 0.99), lean, strict=True):
         root = np.array([np.interp(share * run[-1], run, margin[:, axis]) for axis in range(3)])
-        full = row.length * np.interp(share, PLACES, row.sizes) * random.uniform(0.62, 1.12)
-        fan = (share - MIDDLE_FAN) * 0.95 + by + random.normal(0, 0.09)
+        full = row.length * np.interp(share, PLACES, row.sizes) * random.uniform(0.72, 1.08)
+        fan = (share - MIDDLE_FAN) * 0.95 + by + random.normal(0, 0.04)
         blades.append(_blade(root, centre, full, fan, row))
-    pattern, colours = blade_triangles(SEGMENTS), np.tile([*COLOUR, 0.35], (len(blades[0]), 1))
+    pattern, colours = blade_triangles(row.segments), np.tile([*COLOUR, 0.35], (len(blades[0]), 1))
     return join([(blade, pattern, colours) for blade in blades])
 
 
@@ -72,10 +74,10 @@ def _blade(root: Float64, centre: Float64, length: float, lean: float, row: Row)
     side = np.array([1.0, 0.0, -0.25 * np.sign(outward[0])])
     side /= np.linalg.norm(side)
     place, points = root.copy(), []
-    for k in range(SEGMENTS + 1):
-        t = k / SEGMENTS
-        width = row.width * (1 - 0.75 * t)
-        points += [place - side * width / 2, place + side * width / 2] if k < SEGMENTS else [place]
+    for k in range(row.segments + 1):
+        t = k / row.segments
+        width = row.width * (1 - 0.8 * t)
+        points += [place - side * width / 2, place + side * width / 2] if k < row.segments else [place]
         direction = start * (1 - t) + end * t
-        place = place + direction / np.linalg.norm(direction) * length / SEGMENTS
+        place = place + direction / np.linalg.norm(direction) * length / row.segments
     return np.array(points)

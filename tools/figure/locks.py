@@ -14,9 +14,9 @@ SEGMENTS = 2
 GLOSS = 0.1
 GROUPS = (
     # name; count; heights above the hairline of the roots; length; width; how far the tips stand out, metres
-    ("front", 70, (0.005, 0.024), (0.010, 0.024), 0.00030, 0.0030),
-    ("crown", 45, (0.026, 1.0), (0.018, 0.034), 0.00040, 0.0030),
-    ("stray", 60, (0.030, 1.0), (0.022, 0.045), 0.00025, 0.0060),
+    ("front", 64, (0.004, 0.022), (0.012, 0.030), 0.00026, 0.0045),
+    ("crown", 19, (0.026, 1.0), (0.018, 0.034), 0.00034, 0.0035),
+    ("stray", 92, (0.026, 1.0), (0.024, 0.055), 0.00018, 0.0080),
 )
 NEIGHBOURS = 8
 """Vertices between which the depth of the layer is interpolated."""

@@ -65,7 +65,8 @@ def make_skin() -> tuple[Refined, sculpt.Marks]:
     marks = sculpt.refine_marks(refined, coarse)
     edges = unique_edges(refined.triangles)
     softened = sculpt.soften_crease(refined.vertices, marks, edges)
-    vertices = sculpt.press_lips(sculpt.lay_on_eyeballs(softened, marks.eye), marks) - ORIGIN
+    softened = sculpt.thin_lids(sculpt.lay_on_eyeballs(softened, marks.eye), marks)
+    vertices = sculpt.press_lips(softened, marks) - ORIGIN
     uvs = np.stack([refined.uvs[:, 0], PchipInterpolator(*ROWS)(refined.uvs[:, 1])], axis=1)
     return replace(refined, vertices=symmetrise(vertices), uvs=uvs), marks
 
@@ -203,6 +204,11 @@ def _finish(surface: Refined, marks: sculpt.Marks) -> Float64:
     # What only an open mouth shows of the lips is redder than what the sky lights.
     inner = np.where(near, 1 - smoothstep((ring - 0.2) / 1.4), 0.0)
     colours[:, :3] *= 1 - inner[:, None] * (0.06, 0.24, 0.24)
+    # Little light falls into the inner corners of the eyes.
+    corner = (1 - smoothstep((eye - 0.6) / 2.0)) * (
+        1 - smoothstep((np.abs(surface.vertices[:, 0]) - 0.021) / 0.003)
+    )
+    colours[:, :3] *= 1 - corner[:, None] * (0.22, 0.36, 0.38)
     inside = near & (ring < 0)
     # The throat is darker than the cheeks.
     cheek = smoothstep((np.abs(surface.vertices[:, 0]) - 0.012) / 0.018)

@@ -25,6 +25,8 @@ HAIR_WIDTH = 0.00016
 """Metres."""
 BROW_STROKES = ((1900, 0.0), (800, 0.25))
 """Of both brows: how many hairs, and how far their colour is towards that of the skin."""
+UNFOLDED = 3.2
+"""How many times as high the skin of a closed upper lid is as that of an open one."""
 SPARSEST = 0.03
 """Density of a brow below which no hair grows."""
 TAPER = ((1.0, 110), (0.7, 190), (0.4, 255))
@@ -273,25 +275,43 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     lower = _spot(p, (26, -10, 0), 15) * (y <= -1)
     inner = _spot(p, (17, 1, 2), 13)
     colour = _blend(colour, np.array(looks.socket), upper * 0.42 + lower * 0.46 + inner * 0.25)
-    lid = near & (ring < 5.0)
-    colour = _blend(colour, np.array(looks.waterline), np.where(lid, smoothstep((4.2 - ring) / 2.4) * 0.6, 0))
+    margin = np.where(near, smoothstep((3.4 - ring) / 1.6), 0.0)
+    colour = _blend(colour, np.array(looks.waterline), 0.45 * margin)
     # The lower lid ends in a fold.
     fold = np.where(near, np.exp(-(((ring - 7.0) / 1.3) ** 2)) * 0.35, 0.0) * smoothstep((-4 - y) / 5)
     colour = _blend(colour, np.array(looks.socket), fold * (1 - smoothstep((x - 34) / 8)))
-    # The upper lid is thin and a little darker; it ends in a crease.
-    upper = near & (y > -3)
-    thin = np.where(upper, smoothstep((ring - 3.6) / 1.2) * (1 - smoothstep((ring - 6.4) / 1.6)), 0.0)
-    crease = np.where(upper, np.exp(-(((ring - 7.7) / 0.55) ** 2)), 0.0)
+    colour = _blend(colour, *_thin_lid(p, ring, looks))
+    # The upper lid ends in a crease.
+    crease = np.where(near & (y > -3), np.exp(-(((ring - 7.7) / 0.55) ** 2)), 0.0)
     crease *= smoothstep((x - 21.0) / 5.0) * (1 - smoothstep((x - 39.0) / 5.0))
-    colour = _blend(colour, np.array(looks.socket), 0.30 * thin)
     colour = _blend(colour, np.array(looks.socket) * 0.80, 0.28 * crease)
     # The roots of the lashes form a line along the outer edge of the lid margin.
     line = np.where(near & (y > -3), np.exp(-(((ring - 3.2) / 0.75) ** 2)) * 0.55, 0.0)
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.20, line)
     line *= smoothstep((x - 22.5) / 5.0) * (1 - 0.85 * smoothstep((x - 37.5) / 4.0))
     colour = _blend(colour, np.array(ALEX.brow), line)
-    caruncle = near & (ring < 1.6) & (x < 24)
-    return np.where(caruncle[:, None], np.array(looks.caruncle) + noise(p, 0.001, 9)[:, None] * 10, colour)
+    caruncle = np.where(near, smoothstep((2.6 - ring) / 1.4), 0.0) * (1 - smoothstep((x - 21.5) / 2.5))
+    return _blend(colour, np.array(looks.caruncle) + noise(p, 0.001, 9)[:, None] * 10, caruncle)
+
+
+def _thin_lid(p: Float64, ring: Float64, looks: Looks) -> tuple[Float64, Float64]:
+    """Return (N, 3) colours of the thin skin of the upper lids, and (N,) how far it has them.
+
+    Closed, that skin is some `UNFOLDED` times as high as in its folds, and its spots with it.
+    """
+    across = p * (1.0, UNFOLDED, UNFOLDED)
+    x, y = np.abs(p[:, 0]) * 1000, p[:, 1] * 1000
+    share = (
+        smoothstep((ring - 2.8) / 1.2) * (1 - smoothstep((ring - 8.0) / 3.0)) * smoothstep((y + 1.5) / 3.5)
+    )
+    share *= smoothstep((x - 17.0) / 4.0) * (1 - smoothstep((x - 40.0) / 6.0))
+    lid = 0.50 * np.array(looks.skin) + 0.28 * np.array(looks.waterline) + 0.22 * np.array(looks.socket)
+    spots = 0.6 * noise(across, 0.0042, 31) + 0.4 * noise(across, 0.0022, 32)
+    # Veins are thin lines where a noise changes its sign.
+    wander = across + 0.0012 * np.stack([noise(across, 0.0022, 33 + k) for k in range(3)], axis=1)
+    veins = np.exp(-((noise(wander, 0.0052, 36) / 0.055) ** 2)) * smoothstep(0.5 + noise(across, 0.006, 37))
+    colours = lid + spots[:, None] * (2.0, -8.0, -7.0)
+    return _blend(colours, lid * (0.84, 0.76, 0.86), 0.45 * veins), 0.9 * share
 
 
 def _mouth(colour: Float64, p: Float64, ring: Float64, side: Float64, looks: Looks) -> Float64:

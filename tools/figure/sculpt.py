@@ -32,6 +32,8 @@ MOUTH = np.array([0.0, -0.0708])
 CONTACT_RING = 1
 """Ring along which the lips touch, counted from the border of the inside of the mouth."""
 
+LID_THICKNESS, LID_THINNED = 0.0017, 0.85
+"""Metres from the inner edge of an upper lid's margin up to its skin, and what share of more it loses."""
 CREASE_ROUNDS = 14
 """Rounds of averaging with neighbours that soften the crease of the upper lids."""
 UPPER_LIP = np.array([0.0, 0.0, 1.4, 1.4, 0.4, 0.2, 0.0]) / 1000
@@ -245,6 +247,29 @@ def press_lips(vertices: Float64, marks: Marks) -> Float64:
     vertices = vertices.copy()
     vertices[behind, 1] = np.minimum(vertices[behind, 1], MOUTH[1] - depth[behind])
     return vertices
+
+
+def thin_lids(vertices: Float64, marks: Marks) -> Float64:
+    """Return vertices of the refined head with upper lids as thin as lids are.
+
+    The base's margins are twice as thick, which shows as a rim, and would hang over the lower lids when
+    the eyes close.
+    """
+    left, sign = _both_sides(vertices)
+    upper = upper_side(left[:, 0], left[:, 1]) & (marks.eye != FAR) & (left[:, 2] > 0.045)
+    offset = left - EYE_CENTRE
+    distance = np.linalg.norm(offset, axis=1)
+    angle = np.arctan2(offset[:, 1], offset[:, 0])
+    margin = upper & (np.abs(marks.eye - MARGIN_RING) < 0.1)
+    order = np.argsort(angle[margin])
+    inner = np.interp(angle, angle[margin][order], distance[margin][order])
+    excess = np.maximum(distance - inner - LID_THICKNESS, 0.0)
+    ring = np.where(upper, marks.eye, 0.0)
+    share = smoothstep((ring - MARGIN_RING) / 0.5) * (1 - smoothstep((ring - 5.0) / 3.0))
+    share *= smoothstep(opening_profile(left[:, 0]) / 0.7)
+    moved = left - offset / distance[:, None] * (LID_THINNED * share * excess)[:, None]
+    moved[:, 0] *= sign
+    return moved
 
 
 def soften_crease(vertices: Float64, marks: Marks, edges: Int64) -> Float64:

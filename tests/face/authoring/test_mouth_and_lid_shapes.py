@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fba import figures
-from fba.face.authoring.regions._eye_opening import STRETCHED, stretch_fold
+from fba.face.authoring.regions._eye_opening import STRETCHED, Opening, stretch_fold
 from fba.face.authoring.regions._eyes import Eye
 from fba.face.authoring.regions._lips import lip_motions
 from fba.face.authoring.regions.jaw import hollowing
@@ -107,7 +107,8 @@ def test_the_fold_above_a_closing_lid_is_stretched_out() -> None:
     shifts = np.zeros((4, len(moving), 3))
     shifts[..., 1] = -0.003 * ways[:, None] * share[moving]
     eye = Eye("left", ("eye",), np.array([0.010, -0.012, -0.040]), 0.036, np.zeros(3), measured=True)
-    stretched = stretch_fold(sheet, share, moving, shifts, ways, eye)
+    wide = Opening(np.array([-0.1, 0.1]), np.zeros((2, 2)), np.zeros((2, 2)))  # corners far away
+    stretched = stretch_fold(sheet, share, moving, shifts, ways, wide, eye)
     np.testing.assert_array_equal(stretched[:2], shifts[:2])  # of an eye that is open, or wide open
     edge = share[moving] >= STRETCHED[1]
     np.testing.assert_array_equal(stretched[:, edge], shifts[:, edge])

@@ -44,7 +44,10 @@ STRETCHED = (0.02, 0.85)
 OUTER = 1.05
 """Radii of the eyeball beyond which there is the outside of a lid, not its lining."""
 MOST_RAISED = 0.06
-"""How far, in radii of the eyeball, that raises or sinks a vertex at most."""
+MOST_IN_CORNER = 0.25
+"""How far, in radii of the eyeball, that raises or sinks a vertex at most, and one in a corner of the eye."""
+CORNER = 0.4
+"""Distance from the corners, as a share of the eye's width, up to which the skin counts as theirs."""
 LID_THICKNESS = 0.17
 """Distance of a closed lid's skin from the eyeball, in radii of it, that is not made thinner."""
 THINNED = 0.7
@@ -159,28 +162,43 @@ def thin_lid(
 
 
 def stretch_fold(
-    surface: Surface, share: Float64, vertices: Intp, shifts: Float64, ways: Float64, eye: Eye
+    surface: Surface,
+    share: Float64,
+    vertices: Intp,
+    shifts: Float64,
+    ways: Float64,
+    opening: Opening,
+    eye: Eye,
 ) -> Float64:
     """Return the shifts (K, M, 3) of an upper lid with the skin above its edge stretched as it closes.
 
-    Closed, that skin is smooth like a bent plate, without ridges of the fold that it came out of. share:
-    (N,), share of the margin's motion at each vertex of the surface. vertices: (M,), those that move. ways:
-    (K,), 1 where the eye is closed.
+    Closed, that skin is smooth like a bent plate, without ridges of the fold that it came out of; towards the
+    corners of the eye, where lids run into the skin around, their edges are, too. share: (N,), share of the
+    margin's motion at each vertex of the surface. vertices: (M,), those that move. ways: (K,), 1 where the
+    eye is closed.
     """
     closed = surface.vertices.copy()
     closed[vertices] += shifts[np.abs(ways - 1).argmin()]
     outwards = unit(closed - eye.centre)
     arms = surface.vertices - eye.centre
     outer = (np.linalg.norm(arms, axis=1) > OUTER * eye.radius) & (arms[:, 2] > 0)
-    free = outer & (share > STRETCHED[0]) & (share < STRETCHED[1])
+    along = (closed[:, 0] - opening.x[0]) / (opening.x[-1] - opening.x[0])
+    corner = 1 - smoothstep(np.minimum(along, 1 - along) / CORNER)
+    # margins, whose share is 1, meet where they are
+    free = outer & (share > STRETCHED[0]) & (share < STRETCHED[1] + corner) & (share != 1.0)
     near = free
     for _ in range(PLATE_RINGS):
         near = near | surface.mask(surface.edges[near[surface.edges].any(axis=1)].ravel())
     fixed = np.flatnonzero(near & ~free)
     smooth = solve_smooth_field(surface, free, fixed, closed[fixed], slack=SLACK)
     raised = ((smooth - closed) * outwards).sum(axis=1)
-    lowest = np.minimum(OUTER * eye.radius - np.linalg.norm(closed - eye.centre, axis=1), 0.0)
-    raised = np.clip(raised, np.maximum(lowest, -MOST_RAISED * eye.radius), MOST_RAISED * eye.radius)
+    # between vertices, the skin of a coarse mesh is lower
+    edges = surface.edges[free[surface.edges].any(axis=1)]
+    dips, low = ((closed[edges[:, 0]] - closed[edges[:, 1]]) ** 2).sum(axis=1), np.zeros(len(surface))
+    np.maximum.at(low, edges, dips[:, None] / (4 * eye.radius))
+    lowest = np.minimum(OUTER * eye.radius + low - np.linalg.norm(closed - eye.centre, axis=1), 0.0)
+    most = (MOST_RAISED + (MOST_IN_CORNER - MOST_RAISED) * corner) * eye.radius
+    raised = np.clip(raised, np.maximum(lowest, -most), most)
     raised[~free] = 0.0
     return np.asarray(shifts + smoothstep(ways)[:, None, None] * (raised[:, None] * outwards)[vertices])
 

@@ -152,7 +152,7 @@ def lid_motion(
     else:
         if lid == "upper" and not follows:
             shifts = thin_lid(points, share[vertices], shifts, values / CLOSED, opening, eye)
-            shifts = stretch_fold(marks.surface, share, vertices, shifts, values / CLOSED, eye)
+            shifts = stretch_fold(marks.surface, share, vertices, shifts, values / CLOSED, opening, eye)
         profile = measure_profile(eye, parts, edge_length(marks, own, other))
         # margins that lie in the eyeball, or close to it, meet where they are
         sunk = follows or profile.shortfall(marks.surface.vertices[margins]).max() > MAX_SUNK * profile.size

@@ -65,6 +65,8 @@ void main() {
     vec3 in_head = transpose(head) * n;
     float aside = smoothstep(0.30, 0.95, abs(in_head.x));
     vec3 white = mix(vec3(0.66, 0.63, 0.61), vec3(0.60, 0.40, 0.36), aside * 0.75);
+    // Towards the nose it is redder: there the eyeball's skin lies in a fold.
+    white = mix(white, vec3(0.60, 0.33, 0.29), 0.7 * smoothstep(0.45, 0.85, in_head.x * sign(lids[3].x)));
     float edge = iris + soft;
     base = mix(base, white, smoothstep(edge - soft * 1.5 - 0.05, edge + soft * 1.5 + 0.03, rim));
 
@@ -96,6 +98,6 @@ void main() {
     shown += mix(FLOOR, SKY, mirrored.y * 0.5 + 0.5) * fresnel * (0.3 + 0.7 * shade);
     // Tears stand along the lower lid.
     float tears = smoothstep(0.0, 0.02, above) * (1.0 - smoothstep(0.02, 0.055, above));
-    shown += vec3(0.22) * tears * (0.4 + 0.6 * max(dot(n, KEY_DIRECTION), 0.0));
+    shown += vec3(0.22) * tears * (1.0 - aside) * (0.4 + 0.6 * max(dot(n, KEY_DIRECTION), 0.0));
     pixel = vec4(encode(shown), 1.0);
 }
