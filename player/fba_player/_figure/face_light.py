@@ -27,6 +27,8 @@ LIGHTS = np.array([KEY_DIRECTION, RIM_DIRECTION])
 MOUTH_OPEN = {3: 700, 4: -250, 8: -200, 9: -200, 5: -900, 10: -700, 11: -700,
               51: -250, 55: -200, 56: -200, 52: -900, 57: -700, 58: -700}  # fmt: skip
 """FAPs of a mouth so wide open that light falls in."""
+MOUTH_SHUT = 0.01
+"""Share of that opening up to which lips count as shut, as positions are not exact."""
 FREE_LIGHT = (0.9, 0.8, 0.0, 0.3)
 """Light on a tongue that is put out: key, sky, through, rim."""
 TEETH_FILL_SHARE = 0.56
@@ -188,6 +190,7 @@ class FaceLight:
         if self._lips is None:
             return 0.0
         share = (self._gap(positions) - gaps[0]) / max(gaps[1] - gaps[0], 1e-6)
+        share = (share - MOUTH_SHUT) / (1 - MOUTH_SHUT)
         return float(min(max(share, 0.0), 1.0) ** 0.4)  # the first millimetres let in most of the light
 
     def _gap(self, positions: Float32) -> float:

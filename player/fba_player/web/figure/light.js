@@ -6,6 +6,7 @@ import { checkedList, checkedNumber, checkedNumbers, refuse } from "./container.
 const KEY = [0.7, 0.68, 0.8]; // directions of key and rim light, as in shaders/lighting.glsl
 const RIM = [-0.55, 0.5, -0.85];
 export const HARMONICS = 16;
+const MOUTH_SHUT = 0.01; // lips count as shut up to this share, as positions are not exact
 const MOUTH_CURVE = 0.4; // the first millimetres of an open mouth let in most of the light
 const TEETH_FILL = 0.56; // share of the missing light that is added on teeth when the mouth is open
 const FREE = [0.9, 0.8, 0, 0.3]; // on a tongue that is put out
@@ -77,7 +78,8 @@ export class FaceLight {
     if (!this._lips.length) return 0;
     const [upper, lower] = this._lips.map((lip) => 3 * lip);
     const gap = Math.hypot(positions[upper] - positions[lower], positions[upper + 1] - positions[lower + 1], positions[upper + 2] - positions[lower + 2]);
-    const open = (gap - this._gaps[0]) / Math.max(this._gaps[1] - this._gaps[0], 1e-6);
+    const share = (gap - this._gaps[0]) / Math.max(this._gaps[1] - this._gaps[0], 1e-6);
+    const open = (share - MOUTH_SHUT) / (1 - MOUTH_SHUT);
     return Math.round(Math.min(Math.max(open, 0), 1) ** MOUTH_CURVE * STEPS) / STEPS;
   }
 
