@@ -95,7 +95,7 @@ ILLUSTRATIONS = {
     ("docs/develop.md", "./dev bounds"): "takes hours; .ci/run runs a part, tests/fuzz the command",
     ("docs/develop.md", "./dev fuzz --minutes 30"): "takes minutes; tests/fuzz runs the command",
     ("docs/develop.md", "./dev fuzz --target bvh fuzz-findings/bvh-seed7-1234"): "a file found there",
-    ("docs/develop.md", "python tools/figure/make_head.py"): "replaces the built-in head",
+    ("docs/develop.md", "python -m tools.figure.make_head"): "replaces the built-in head",
     (
         "docs/develop.md",
         "python -m tools.figure_checks",

@@ -19,9 +19,9 @@ ROOT = Path(__file__).parents[1]
 WEB = ROOT / "player" / "fba_player" / "web"
 STEPS: dict[str, tuple[Path, list[str]]] = {
     "samples": (ROOT, [sys.executable, "tools/make_samples.py"]),
-    "body": (ROOT, [sys.executable, "tools/figure/make_body.py"]),
-    "head": (ROOT, [sys.executable, "tools/figure/make_head.py"]),
-    "figures": (ROOT, [sys.executable, "tools/figure/make_figures.py"]),
+    "body": (ROOT, [sys.executable, "-m", "tools.figure.make_body"]),
+    "head": (ROOT, [sys.executable, "-m", "tools.figure.make_head"]),
+    "figures": (ROOT, [sys.executable, "-m", "tools.figure.make_figures"]),
     "capture": (ROOT, [sys.executable, "tools/make_face_capture.py"]),
     "web-figures": (ROOT, [sys.executable, "-m", "tools.web.make_figures"]),
     "web-tables": (ROOT, [sys.executable, "-m", "tools.web.make_page_tables"]),

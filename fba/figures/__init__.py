@@ -45,7 +45,7 @@ def face(name: str = "alex") -> FaceModel:
     data = _read(name)
     if str(data["face"]) != shape_key(head.parts):
         raise ModelError(
-            f"the figure {name!r} was made from another built-in head; run tools/figure/make_figures.py"
+            f"the figure {name!r} was made from another built-in head; run python -m tools.remake figures"
         )
     made = reshape(head, head.vertices + data["face_moves"] * STEP, data["points"].astype(np.float64))
     parts = []
@@ -73,7 +73,7 @@ def body(name: str = "alex") -> BodyModel:
     data = _read(name)
     if str(data["body"]) != shape_key(person.parts):  # type: ignore[arg-type]
         raise ModelError(
-            f"the figure {name!r} was made from another built-in body; run tools/figure/make_figures.py"
+            f"the figure {name!r} was made from another built-in body; run python -m tools.remake figures"
         )
     moved = person.vertices + data["body_moves"] * STEP
     parts = []

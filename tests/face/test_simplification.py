@@ -161,7 +161,7 @@ def test_other_parts_have_no_levels_of_those_before() -> None:
 
 
 def test_the_built_in_head_has_levels() -> None:
-    """Where this fails, `head.glb` has changed: run tools/figure/make_levels.py."""
+    """Where this fails, `head.glb` has changed: run python -m tools.figure.make_levels."""
     head = FaceModel.default()
     sizes = [len(level.model.triangles) for level in head.levels]
     assert sizes == level_sizes(head, len(sizes))

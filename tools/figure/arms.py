@@ -8,11 +8,11 @@ point of the elbow, have the same texels, so that it needs no seam.
 from __future__ import annotations
 
 import numpy as np
-from hair import noise
-from paint import encode_linear
 
 from fba.arrays import Bool, Float64
 from fba.sampling import smoothstep
+from tools.figure.head.hair import noise
+from tools.figure.paint import encode_linear
 
 FORMS = (
     # beyond the elbow, around; metres and degrees over which it fades; its height, millimetres

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from cutting import Cloth
-from person import Person
 
 from fba.arrays import Float64
 from fba.body import Skeleton
 from fba.sampling import smoothstep
+from tools.figure.cutting import Cloth
+from tools.figure.person import Person
 
 HINGES = (
     ("?_shoulder", "?_elbow", "?_wrist", (0.0, 0.0, 1.0), 0.040, 0.056),

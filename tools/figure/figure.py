@@ -7,11 +7,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from meshes import unique_edges
 
 from fba.arrays import Bool, Float64, Int64, Integer
+from tools.figure.meshes import unique_edges
 
-FILE = Path(__file__).parent / "figure.npz"
+FILE = Path(__file__).parent / "data" / "figure.npz"
 EYE_LEVEL = 1.65
 """Metres above the ground: the origin of the figure's head while it is worked on."""
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import sculpt
-from subdivide import Refined
 
 from fba.arrays import Bool, Float64, Int32
 from fba.face import feature_point_names as names
 from fba.face.feature_points import MIRRORED
 from fba.parameters import point_rows
+from tools.figure import sculpt
+from tools.figure.subdivide import Refined
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parent / "data"
 
 
 def bound_points(

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from build import Build
 
 from fba.arrays import Float64
+from tools.figure.build import Build
 
 Colour = tuple[float, float, float]
 
@@ -123,7 +123,7 @@ def reshape(looks: Looks, positions: Float64) -> Float64:
     moved = positions.copy()
     away = np.linalg.norm(positions[:, None] - EYES, axis=2).min(axis=1)
     free = smoothstep((away - STILL) / (MOVING - STILL))[:, None]
-    with (Path(__file__).parent / "shapes.csv").open(encoding="utf-8") as file:
+    with (Path(__file__).parent / "data" / "shapes.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["figure"] == looks.name]
     for row in rows:
         place, shift, stretch = (np.array([float(row[c]) for c in names]) for names in COLUMNS)

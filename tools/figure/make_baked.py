@@ -1,6 +1,6 @@
 """Makes what the player need not compute of the figures that come with it: light and coarse meshes.
 
-    python tools/figure/make_baked.py
+    python -m tools.figure.make_baked
 
 To be run after each change of `head.glb`, `levels.glb` or `body.glb` (`make_figures.py` does).
 """

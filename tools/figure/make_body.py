@@ -1,6 +1,6 @@
 """Makes the built-in person: `fba/body/builtin/body.glb`.
 
-    python tools/figure/make_body.py
+    python -m tools.figure.make_body
 
 The figure without its head (which the built-in face replaces, on the same neck), dressed; joints and
 weights in the standard's terms (`rig.py`).
@@ -12,18 +12,9 @@ import io
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import arms
-import clothes
-import folds
 import numpy as np
-import rig
-import shoes
-from cutting import Cloth
-from person import Person
 from scipy.spatial import cKDTree
-from sculpt import ORIGIN
 
-import figure
 from fba.arrays import Bool, Float64, Int64
 from fba.body import BodyModel, BodyPart, Skeleton
 from fba.body._model import Material
@@ -34,6 +25,11 @@ from fba.mesh import vertex_normals
 from fba.parameters import point_rows
 from fba.sampling import smoothstep
 from fba_player._figure.occlusion import bake
+from tools.figure import arms, figure, rig
+from tools.figure.clothing import clothes, folds, shoes
+from tools.figure.cutting import Cloth
+from tools.figure.person import Person
+from tools.figure.sculpt import ORIGIN
 
 TARGET = Path(__file__).parents[2] / "fba" / "body" / "builtin" / "body.glb"
 GLOSS = 0.38

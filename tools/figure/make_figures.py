@@ -1,6 +1,6 @@
 """Makes what differs in the other figures from the built-in person: `fba/figures/NAME.npz`.
 
-    python tools/figure/make_figures.py
+    python -m tools.figure.make_figures
 
 To be run after each change of `head.glb` or `body.glb`.
 """
@@ -10,14 +10,8 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
-import arms
-import make_baked
-import make_head
 import numpy as np
-from looks import ALEX, FIGURES, Looks, reshape
-from sculpt import ORIGIN
 
-import figure
 from fba.arrays import Float32, Float64, Int32
 from fba.body import BodyModel, Skeleton
 from fba.face import Deformer, FaceModel
@@ -26,6 +20,9 @@ from fba.face.checks._fap_checks import TURNING
 from fba.face.model import shape_key
 from fba.figures import STEP
 from fba.parameters import faps
+from tools.figure import arms, figure, make_baked, make_head
+from tools.figure.looks import ALEX, FIGURES, Looks, reshape
+from tools.figure.sculpt import ORIGIN
 
 BUILTIN = Path(__file__).parents[2] / "fba"
 ROUNDS = 8

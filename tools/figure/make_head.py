@@ -1,6 +1,6 @@
 """Makes the built-in head, `fba/face/builtin/head.glb`, and its levels of detail, `levels.glb`.
 
-    python tools/figure/make_head.py
+    python -m tools.figure.make_head
 
 Base figure, see NOTICE.txt: cut, given adult proportions and the standard's neutral face (`sculpt.py`),
 refined about eyes, mouth and skull (`subdivide.py`); eyeballs, teeth, tongue added; feature points bound.
@@ -11,30 +11,23 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import eyeballs
-import garment
-import landmarks
-import lashes
-import locks
-import make_levels
-import mouth
 import numpy as np
-import paint
-import sculpt
-from hair import grow, scalp
-from looks import ALEX, Looks, reshape
-from meshes import Mesh, join, mirror, unique_edges
 from scipy.interpolate import PchipInterpolator
-from sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
-from subdivide import Refined, refine
 
-import figure
 from fba.arrays import Float64, Int32
 from fba.face import FaceModel, Material, Part, compact
 from fba.face.authoring import author
 from fba.mesh import vertex_normals
 from fba.parameters import point_rows
 from fba.sampling import smoothstep
+from tools.figure import figure, landmarks, make_levels, paint, sculpt
+from tools.figure.clothing import garment
+from tools.figure.head import eyeballs, lashes, locks, mouth
+from tools.figure.head.hair import grow, scalp
+from tools.figure.looks import ALEX, Looks, reshape
+from tools.figure.meshes import Mesh, join, mirror, unique_edges
+from tools.figure.sculpt import EYE_CENTRE, EYE_RADIUS, IRIS, ORIGIN
+from tools.figure.subdivide import Refined, refine
 
 HERE = Path(__file__).parent
 TARGET = HERE.parents[1] / "fba" / "face" / "builtin" / "head.glb"

@@ -1,6 +1,6 @@
 """Makes the levels of detail of the built-in head: `fba/face/builtin/levels.glb`.
 
-    python tools/figure/make_levels.py
+    python -m tools.figure.make_levels
 
 To be run after each change of `head.glb` (`make_head.py` does): levels of another shape are not used. The
 levels have no tables: players move them as the head moves at the places of their vertices.

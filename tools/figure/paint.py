@@ -6,14 +6,14 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
-from hair import TONES, noise, paint_locks, painted_height
-from looks import ALEX, Looks
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
 from fba.arrays import Bool, Float64, Integer
 from fba.sampling import smoothstep
+from tools.figure.head.hair import TONES, noise, paint_locks, painted_height
+from tools.figure.looks import ALEX, Looks
 
 SIZE = 2048
 

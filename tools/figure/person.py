@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from subdivide import refine
 
-import figure
 from fba.arrays import Bool, Float64, Int64
 from fba.sampling import smoothstep
+from tools.figure import figure
+from tools.figure.subdivide import refine
 
 WIDER = 0.024
 """Metres by which each shoulder is moved out: joints 0.37 m apart, average for adults of this height."""

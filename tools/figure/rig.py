@@ -10,12 +10,8 @@ import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import arms
-import bending
 import numpy as np
-from person import Person, make_person, reproportion
 
-import figure
 from fba.arrays import Float64, Int64
 from fba.body import Skeleton
 from fba.body.solve._bind_pose import (
@@ -27,8 +23,10 @@ from fba.body.solve._bind_pose import (
     vertebrae_between,
 )
 from fba.sampling import smoothstep
+from tools.figure import arms, bending, figure
+from tools.figure.person import Person, make_person, reproportion
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parent / "data"
 SKULLBASE = np.array([0.0, 1.6182, -0.0177])
 """Centre of the head's rotation: feature point 7.1 of the built-in head."""
 TORSO = ("Root", "Hips", "Spine1", "Spine2", "Chest")

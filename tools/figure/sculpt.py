@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from subdivide import Refined
 
 from fba.arrays import Bool, Float64, Int64
 from fba.sampling import smoothstep
-from figure import Surface
+from tools.figure.figure import Surface
+from tools.figure.subdivide import Refined
 
 EYE_CENTRE = np.array([0.0312, -0.0018, 0.0620])
 """Centre of the left eyeball in the frame of `figure.head`."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from meshes import sides
 
 from fba.arrays import Bool, Float64, Int64
-from figure import Surface
+from tools.figure.figure import Surface
+from tools.figure.meshes import sides
 
 
 @dataclass(frozen=True, eq=False)

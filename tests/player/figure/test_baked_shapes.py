@@ -16,7 +16,7 @@ from fba_player._figure.far_head import find_collapses
 from fba_player._figure.person import body_shape
 
 pytestmark = pytest.mark.skipif(not is_compiled(), reason="without numba all vertices count as free")
-STALE = "the figures have changed: run tools/figure/make_baked.py"
+STALE = "the figures have changed: run python -m tools.figure.make_baked"
 
 
 @pytest.mark.parametrize("name", figures.FIGURES)

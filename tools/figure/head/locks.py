@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from hair import MIDDLE, RADIUS, TONES, height_above_hairline, noise, shine, strand_places, strand_points
-from looks import ALEX, Hair
-from meshes import Mesh, blade_triangles, join
 
 from fba.arrays import Float64, Integer
 from fba.rotations import unit
+from tools.figure.head.hair import (
+    MIDDLE,
+    RADIUS,
+    TONES,
+    height_above_hairline,
+    noise,
+    shine,
+    strand_places,
+    strand_points,
+)
+from tools.figure.looks import ALEX, Hair
+from tools.figure.meshes import Mesh, blade_triangles, join
 
 SEGMENTS = 2
 GLOSS = 0.1

@@ -6,9 +6,9 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from meshes import Mesh, join, mirror, tube
 
 from fba.arrays import Float64, Integer
+from tools.figure.meshes import Mesh, join, mirror, tube
 
 ENAMEL = np.array([0.78, 0.68, 0.55])
 """Linear light."""
@@ -58,7 +58,7 @@ def teeth(front: Float64, *, upper: bool) -> tuple[Mesh, dict[str, int]]:
     """
     sign = 1.0 if upper else -1.0
     meshes: list[Mesh] = []
-    with (Path(__file__).parent / "teeth.csv").open(encoding="utf-8") as file:
+    with (Path(__file__).parents[1] / "data" / "teeth.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["jaw"] == ("upper" if upper else "lower")]
     along = 0.00006
     for row in rows:

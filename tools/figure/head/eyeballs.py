@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from looks import Colour
-from meshes import Mesh, tube
 
 from fba.arrays import Float64, Int64
+from tools.figure.looks import Colour
+from tools.figure.meshes import Mesh, tube
 
 AROUND = 40
 SCLERA = np.array([0.80, 0.76, 0.72])

@@ -9,17 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from clothes import (
-    ELBOW,
-    SHOULDER,
-    Garment,
-    depth_below_collar,
-    height_above_hem,
-    height_above_shirt_hem,
-    length_inside_sleeve,
-)
-from hair import noise
-from paint import encode_linear, make_chart
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
@@ -28,6 +17,17 @@ from fba.body import Skeleton
 from fba.mesh import vertex_normals
 from fba.rotations import unit
 from fba.sampling import smoothstep
+from tools.figure.clothing.clothes import (
+    ELBOW,
+    SHOULDER,
+    Garment,
+    depth_below_collar,
+    height_above_hem,
+    height_above_shirt_hem,
+    length_inside_sleeve,
+)
+from tools.figure.head.hair import noise
+from tools.figure.paint import encode_linear, make_chart
 
 NAMES = list(Skeleton.default().names)
 ARMHOLE = 0.163

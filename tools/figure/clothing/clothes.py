@@ -10,8 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from cutting import MIDLINE, Cloth
-from person import Person
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
@@ -20,6 +18,8 @@ from fba.body import Skeleton
 from fba.mesh import vertex_normals
 from fba.rotations import unit
 from fba.sampling import smoothstep
+from tools.figure.cutting import MIDLINE, Cloth
+from tools.figure.person import Person
 
 EdgeDistance = Callable[[Float64, Float64], Float64]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from cutting import Cloth
-from meshes import average_with_neighbours, open_edges, tube
-from subdivide import refine
 
-import figure
 from fba.arrays import Float64, Int64
 from fba.mesh import vertex_normals
 from fba.sampling import smoothstep
+from tools.figure import figure
+from tools.figure.cutting import Cloth
+from tools.figure.meshes import average_with_neighbours, open_edges, tube
+from tools.figure.subdivide import refine
 
 COLOUR = np.array([0.052, 0.088, 0.125])
 """Linear light."""

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from looks import Hair
 from PIL import Image, ImageDraw
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter, map_coordinates
@@ -18,6 +17,7 @@ from scipy.spatial import cKDTree
 from fba.arrays import Bool, Float64
 from fba.rotations import unit
 from fba.sampling import smoothstep
+from tools.figure.looks import Hair
 
 Complex128 = npt.NDArray[np.complex128]
 MIDDLE = np.array([0.0, 0.012, -0.085])
@@ -147,7 +147,7 @@ def _roundness(vertices: Float64, scalp: Bool) -> Float64:
 
 def height_above_hairline(positions: Float64) -> Float64:
     """Return (N,) metres above the hairline of points (N, 3): positive on the scalp, -1 on ears."""
-    with (Path(__file__).parent / "hairline.csv").open(encoding="utf-8") as file:
+    with (Path(__file__).parents[1] / "data" / "hairline.csv").open(encoding="utf-8") as file:
         line = np.array([[float(row["degrees"]), float(row["y"]) / 1000] for row in csv.DictReader(file)])
     around = np.degrees(np.arctan2(np.abs(positions[:, 0]), positions[:, 2] - AXIS))
     height = PchipInterpolator(line[:, 0], line[:, 1])

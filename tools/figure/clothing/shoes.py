@@ -5,13 +5,13 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from clothes import MIRROR, Garment
-from meshes import tube
-from paint import encode_linear, make_chart
 
 from fba.arrays import Float64, Int64
 from fba.mesh import vertex_normals
 from fba.sampling import smoothstep
+from tools.figure.clothing.clothes import MIRROR, Garment
+from tools.figure.meshes import tube
+from tools.figure.paint import encode_linear, make_chart
 
 LEATHER = np.array([0.030, 0.026, 0.024])
 SOLE = np.array([0.42, 0.41, 0.39])

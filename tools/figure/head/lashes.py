@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from meshes import Mesh, blade_triangles, join
 
 from fba.arrays import Float64
+from tools.figure.meshes import Mesh, blade_triangles, join
 
 COLOUR = np.array([0.030, 0.020, 0.014])
 """Linear light."""

@@ -1,0 +1,1 @@
+"""Parts of the head that the neutral figure lacks."""
