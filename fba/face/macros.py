@@ -13,7 +13,7 @@ __all__ = ["OPEN_MOUTH", "open_mouth"]
 
 OPEN_MOUTH = MappingProxyType(
     {
-        "open_jaw": 515,
+        "open_jaw": 590,
         "lower_t_midlip": -140,
         "raise_b_midlip": -960,
         "lower_t_lip_lm": -125,

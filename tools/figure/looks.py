@@ -78,7 +78,7 @@ ALEX = Looks(
         colours=((30, 21, 17), (54, 38, 29), (84, 60, 44), (122, 90, 66)),
     ),
     skin=(217, 168, 142), blush=(214, 138, 118), socket=(186, 128, 112), neck=(206, 158, 131),
-    waterline=(203, 138, 126), caruncle=(222, 148, 138), lip=(191, 114, 103), lip_line=(146, 78, 71),
+    waterline=(203, 138, 126), caruncle=(216, 158, 142), lip=(191, 114, 103), lip_line=(146, 78, 71),
     freckle=(178, 118, 92), scalp=(96, 72, 60), brow=(60, 44, 34), beard=0.35,
 )  # fmt: skip
 """The built-in person: a young man with brown hair."""
@@ -89,7 +89,7 @@ RUTH = Looks(
         colours=((52, 48, 47), (88, 84, 82), (136, 133, 131), (184, 182, 180)),
     ),
     skin=(128, 86, 66), blush=(132, 76, 62), socket=(94, 60, 48), neck=(120, 80, 61),
-    waterline=(150, 98, 86), caruncle=(186, 118, 108), lip=(132, 78, 69), lip_line=(84, 45, 40),
+    waterline=(150, 98, 86), caruncle=(172, 110, 94), lip=(132, 78, 69), lip_line=(84, 45, 40),
     freckle=(92, 58, 42), scalp=(84, 66, 58), brow=(66, 56, 52), brow_height=0.72, lines=1.0, gloss=0.75,
     girth=0.86, muscles=0.50,
     iris=((0.080, 0.040, 0.018), (0.038, 0.021, 0.012)),

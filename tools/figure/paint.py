@@ -290,7 +290,7 @@ def _eyes(colour: Float64, p: Float64, ring: Float64, looks: Looks) -> Float64:
     line = np.where(near & (y <= -3), np.exp(-(((ring - 3.1) / 0.6) ** 2)) * 0.20, line)
     line *= smoothstep((x - 22.5) / 5.0) * (1 - 0.85 * smoothstep((x - 37.5) / 4.0))
     colour = _blend(colour, np.array(ALEX.brow), line)
-    caruncle = np.where(near, smoothstep((2.6 - ring) / 1.4), 0.0) * (1 - smoothstep((x - 21.5) / 2.5))
+    caruncle = np.where(near, smoothstep((2.3 - ring) / 1.6), 0.0) * (1 - smoothstep((x - 21.5) / 2.5))
     return _blend(colour, np.array(looks.caruncle) + noise(p, 0.001, 9)[:, None] * 10, caruncle)
 
 

@@ -43,10 +43,10 @@ CLOSING_SKY = 0.45
 """Least share of the sky's light along lips and lids, where they touch."""
 ENCLOSED = 0.04
 """Vertices near the mouth that see less of the sky than this while it is shut may be inside."""
-INSIDE_KEY, INSIDE_SKY, TONGUE_SKY = 0.55, 0.66, 0.35
+INSIDE_KEY, INSIDE_SKY, TONGUE_SKY = 0.47, 0.5, 0.3
 """Shares of key light and sky that reach the inside of an open mouth by reflection; a tongue, lit by red
 walls, mirrors little of the sky."""
-THROAT, DARKEST = 1.1, 0.35
+THROAT, DARKEST = 0.9, 0.2
 """Distance behind the lips, in ES0, at which the least share of that light is left, and that share."""
 CONSTANT_HARMONIC = 0.282095
 """The first spherical harmonic, equal in all directions."""

@@ -129,7 +129,7 @@ def test_a_face_without_levels_is_drawn_in_full() -> None:
     assert shapes(Details().choose(full, FAR, PIXEL)) == shapes(full)
 
 
-@pytest.mark.parametrize(("away", "halvings"), [(1.0, 0), (4.0, 1), (16.0, 3)])
+@pytest.mark.parametrize(("away", "halvings"), [(1.0, 0), (2.0, 1), (8.0, 3)])
 def test_of_lashes_much_narrower_than_a_pixel_fewer_are_drawn(
     figure: FaceFigure, away: float, halvings: int
 ) -> None:
