@@ -194,7 +194,7 @@ ROWS = (
     ),
     Row(
         "built-in head moved by all 66 FAPs, with normals",
-        "20,989 vertices; warm, one core, `out=`",
+        "20,527 vertices; warm, one core, `out=`",
         "{milliseconds:.2f} ms a frame, {ratio:.0f} times a copy of the arrays",
         "figures/test_face.py::test_deform[built-in head]",
         chosen=True,

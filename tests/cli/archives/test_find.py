@@ -46,7 +46,7 @@ def test_an_index_is_built(run: Run, made: Path, tmp_path: Path) -> None:
 
 def test_a_picture_is_found(run: Run, made: Path) -> None:
     out = run("find", made / "5.png", made / "index.npz", "--count", 3).out
-    assert "5.png: raising.fba, frame 5 (2.00 s), from its front (0 degrees), distance 0.000" in out
+    assert "5.png: raising.fba, frame 5 (2.00 s), from its front (0 degrees), distance 0.00" in out
     assert "from another side: raising.fba, frame" in out
     assert len(out.splitlines()) == 6  # a head and three rows
     (report,) = json.loads(run("find", made / "5.png", made / "index.npz", "--json").out)
