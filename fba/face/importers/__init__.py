@@ -89,7 +89,7 @@ def _import(form: str, options: ImportOptions, points: object) -> FaceModel:
 
         return import_gltf(options, points)
     if form == "shapes":
-        from fba.face.importers._shape_folder import import_shape_folder
+        from fba.face.importers._shaped import import_shape_folder
 
         return import_shape_folder(options, points)
     from fba.face.importers._mesh import import_mesh
@@ -121,7 +121,7 @@ def sniff(path: str | os.PathLike[str]) -> str:
 
 
 def _kind_of_folder(path: Path) -> str:
-    from fba.face.importers._shape_folder import neutral_file
+    from fba.face.importers._shaped import neutral_file
     from fba.face.importers.makehuman.makehuman import base_file
 
     if neutral_file(path) is not None:
