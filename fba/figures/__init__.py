@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, TypeVar, cast
 import numpy as np
 
 from fba.body.builtin import default as default_body
-from fba.body.head_attachment import SKULL
 from fba.errors import ModelError
 from fba.face.builtin import default as default_face
 from fba.face.calibration import rebuild_part, reshape
@@ -81,7 +80,7 @@ def body(name: str = "alex") -> BodyModel:
         start = person.starts[part.name]
         placed = rebuild_part(cast("Part", part), moved[start : start + len(part.vertices)])
         parts.append(_tint(cast("BodyPart", placed), tint))
-    bind, skull = data["body_bind"], person.skeleton.number(SKULL)
+    bind, skull = data["body_bind"], person.skeleton.number("skullbase")
     eyes = cast("Float64", person.eyes) + (bind - person.bind)[skull, :3, 3]
     skeleton = replace(person.skeleton, centres=data["body_centres"].astype(np.float64))
     return replace(person, parts=tuple(parts), skeleton=skeleton, bind=bind, eyes=eyes, name=name)
