@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,6 +31,10 @@ RIDGE = 0.1
 """Regularisation: a shape at weight 1 costs as much as 10 % of the motion at another point."""
 TOTAL = 0.3
 """Regularisation: a sum of the weights of 1 costs 30 % of it, so that few shapes are mixed."""
+LEAST_REACH = 0.9
+"""Share of what the mesh's own tables move a point, below which shapes that fold earlier are not used."""
+REACHED = 2 / 3
+"""Share of a typical value at which that is measured."""
 MOST_DETAIL = 1.5
 """Shapes may add to what the mesh's own tables move at most this many times the motion of these."""
 MOST_WEIGHT = 1.25
@@ -136,6 +141,10 @@ class Mixer:
             else:
                 inner = (first_steps(self.base, mate, -1.0), first_steps(self.base, mate, 1.0))
                 made |= self._coupled_tables(mate, fap, inner, (down, up))
+        for fap, value in ((fap, sign * REACHED * self._value(fap)) for fap in group for sign in details):
+            before, now = (self._shift(tables, fap, value) for tables in (self.base.table_of, made))
+            if np.linalg.norm(now) < LEAST_REACH * np.linalg.norm(before):
+                return {}, set()
         return made, used
 
     def _coupled_tables(
@@ -158,6 +167,16 @@ class Mixer:
             table = _tables(self.base, surface, fap, motion, share, down, up)
             made |= {fap: table} if table is not None else {}
         return made
+
+    def _shift(self, tables: Mapping[int, FaceDefTables], fap: int, value: float) -> Float64:
+        """Return (3,) shift, in FAPU, of a FAP's point by its value and that of its lip mate."""
+        entry = faps()[fap - 1]
+        vertex = self.base.bound[point_rows()[entry.feature_points[0]]]
+        total = np.zeros(3)
+        both = {fap, entry.lip_mate or fap} & tables.keys()
+        for mesh in (mesh for each in both for mesh in tables[each].meshes):
+            total += mesh.shift(value)[mesh.vertices + self.base.starts[mesh.part] == vertex].sum(axis=0)
+        return total
 
     def _points_moved_together(self, group: tuple[int, ...]) -> dict[str, int]:
         """Return the points that shapes move together and their FAPs: a group's and its inner lip mates'."""
