@@ -29,7 +29,7 @@ SLICES = 18
 """Cross sections, at most, in which the tongue is moved up and down; each has about as many vertices."""
 ADULT = 0.064
 """Distance of an adult's eyes: lengths below are in metres of such a face."""
-CLEARANCE = 0.0004
+CLEARANCE = 0.0006
 """Distance kept from teeth and lips."""
 SHUT, WIDE = 0.0015, 0.0045
 """Gaps of lips or teeth: up to the first no tongue comes out, from the second on it does."""

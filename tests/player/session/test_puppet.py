@@ -241,7 +241,7 @@ def test_the_mouth_opens_jaw_and_lips_over_what_is_played() -> None:
     puppet.mouth_opening = 50
     faps = shown(puppet)[0]
     assert not puppet.idle
-    assert (faps[2], faps[4], faps[51], faps[18]) == (1003 + 370, 1005 - 370, 1052 - 370, 1019)
+    assert (faps[2], faps[4], faps[51], faps[18]) == (1003 + 295, 1005 - 480, 1052 - 480, 1019)
     puppet.release_all()
     assert puppet.idle
 

@@ -8,7 +8,7 @@ import { IDENTITY } from "./matrices.js";
 
 const TONGUE_FAPS = [42, 43, 44, 45, 46]; // columns
 const FULL_AT = 60; // value of one of them from which the tongue keeps fully to the room that it has
-const [ADULT, CLEARANCE, SOFT, THICK_TEETH] = [0.064, 0.0004, 0.007, 0.006]; // metres; eyes of an adult are so far apart
+const [ADULT, CLEARANCE, SOFT, THICK_TEETH] = [0.064, 0.0006, 0.007, 0.006]; // metres; eyes of an adult are so far apart
 const [SHUT, WIDE] = [0.0015, 0.0045]; // gaps between which a tongue begins to come out
 const [LATERAL, DROOP] = [0.8, 6];
 const [LIPS, TEETH] = [["2.2", "2.3", "2.4", "2.5"], ["9.10", "9.11", "9.8", "9.9"]];
