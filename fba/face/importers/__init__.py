@@ -124,9 +124,12 @@ def _kind_of_folder(path: Path) -> str:
     from fba.face.importers._shaped import neutral_file
     from fba.face.importers.makehuman.makehuman import base_file
 
-    if neutral_file(path) is not None:
+    try:
+        base_file(path)
+    except ModelError:
+        if neutral_file(path) is None:
+            raise
         return "shapes"
-    base_file(path)
     return "makehuman"
 
 

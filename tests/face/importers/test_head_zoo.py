@@ -16,7 +16,7 @@ from fba.face.checks import check_faps
 from fba.face.deform._deformer import Deformer
 from fba.face.fapu import Fapu
 from fba.face.feature_points import MIRRORED, names
-from fba.face.importers import import_model
+from fba.face.importers import import_model, sniff
 from fba.face.importers._gltf import gltf_pieces
 from fba.face.importers._shaped import locate
 from fba.face.importers.assembly._polygon_parts import Piece
@@ -189,6 +189,12 @@ def test_a_folder_of_shapes_moves_as_the_same_head_in_one_file(tmp_path: Path) -
     np.testing.assert_allclose(
         Deformer(folder).feature_points(values), Deformer(whole).feature_points(values), atol=2e-5
     )
+
+
+def test_a_folder_with_the_base_mesh_is_makehumans(tmp_path: Path) -> None:
+    for name in ("base", "neutral", "neutral_male"):
+        (tmp_path / f"{name}.obj").write_text("v 0 0 0\n")
+    assert sniff(tmp_path) == "makehuman"
 
 
 @pytest.mark.parametrize(
